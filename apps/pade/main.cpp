@@ -1,0 +1,14 @@
+// The `pade` command line: one file per subcommand, no algorithm inside.
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "pade/core/version.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app("PADE: obstacle maps from one camera and a GPS/INS.", "pade");
+  app.set_version_flag("--version", "pade " + std::string(pade::version));
+  app.require_subcommand(1);
+  CLI11_PARSE(app, argc, argv);
+  return 0;
+}

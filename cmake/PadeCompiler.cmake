@@ -1,0 +1,42 @@
+# How our own code is compiled: warnings, sanitizers, and the kernels that exist once per instruction set.
+
+add_library(pade_warnings INTERFACE)
+target_compile_options(pade_warnings INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+if(PADE_WERROR)
+  target_compile_options(pade_warnings INTERFACE -Werror)
+endif()
+
+# Contraction to fused multiply-add would make the result depend on the machine; see docs/design.md.
+add_compile_options(-ffp-contract=off)
+
+if(PADE_SANITIZE)
+  add_compile_options(-fsanitize=${PADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${PADE_SANITIZE})
+endif()
+
+# pade_add_kernels(<target> <file.cpp>...): compile each file once per instruction set, with PADE_ISA
+# defined to baseline, avx2 or avx512. The file puts its functions into namespace PADE_ISA; the caller picks
+# one at run time with pade::simd::dispatch (core/simd.hpp). Kernel files include no heavy headers, so that no
+# inline function compiled for a newer machine can be linked into the common path.
+function(pade_add_kernels target)
+  set(isas baseline)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    list(APPEND isas avx2 avx512)
+  endif()
+  set(flags_baseline "")
+  set(flags_avx2 -mavx2 -mfma -mf16c -mbmi2)
+  set(flags_avx512 -mavx512f -mavx512bw -mavx512dq -mavx512vl -mfma -mf16c -mbmi2 -mprefer-vector-width=512)
+  foreach(file IN LISTS ARGN)
+    get_filename_component(stem ${file} NAME_WE)
+    foreach(isa IN LISTS isas)
+      add_library(${stem}_${isa} OBJECT ${file})
+      target_compile_definitions(${stem}_${isa} PRIVATE PADE_ISA=${isa})
+      # Trapping and errno are never used; without them comparisons and square roots vectorise. NaN stays NaN.
+      target_compile_options(${stem}_${isa} PRIVATE ${flags_${isa}} -O3 -fno-math-errno -fno-trapping-math
+                                                    -fvisibility=hidden)
+      target_include_directories(${stem}_${isa} PRIVATE ${PROJECT_SOURCE_DIR}/src)
+      target_link_libraries(${stem}_${isa} PRIVATE pade_warnings)
+      target_sources(${target} PRIVATE $<TARGET_OBJECTS:${stem}_${isa}>)
+    endforeach()
+  endforeach()
+endfunction()

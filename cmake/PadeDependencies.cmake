@@ -1,0 +1,12 @@
+# The libraries that the core needs. Third-party headers are SYSTEM: their warnings are not ours.
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(PadeOpenCV REQUIRED)
+find_package(octomap 1.9 REQUIRED)
+list(APPEND CMAKE_MODULE_PATH /usr/share/cmake/geographiclib)
+find_package(GeographicLib 2.1 REQUIRED)
+find_package(yaml-cpp 0.7 REQUIRED)
+find_package(nlohmann_json 3.11 REQUIRED)
+find_package(fmt 9 REQUIRED)
+find_package(spdlog 1.10 REQUIRED)
+find_package(CLI11 2.1 REQUIRED)
+find_package(Threads REQUIRED)

@@ -1,0 +1,18 @@
+// One image with its time and pose: what walks through the pipeline.
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "pade/core/pose.hpp"
+#include "pade/core/time.hpp"
+
+namespace pade {
+
+/// An undistorted image, when it was taken, and from where.
+struct Frame {
+  Time time;
+  cv::Mat image;        ///< CV_8UC1 (grey) or CV_8UC3 (BGR)
+  Pose T_world_camera;  ///< camera x right, y down, z forward; metres
+};
+
+}  // namespace pade

@@ -1,0 +1,34 @@
+// Time stamps: int64 nanoseconds, so that stamps compare exactly and survive a round trip through a file.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace pade {
+
+/// A moment, counted from the zero of the recording (often, but not always, the Unix epoch).
+struct Time {
+  std::int64_t nanoseconds = 0;
+
+  static Time from_seconds(double seconds);
+  [[nodiscard]] double seconds() const { return static_cast<double>(nanoseconds) * 1e-9; }
+  auto operator<=>(const Time&) const = default;
+};
+
+/// `a - b` in seconds, exact to a nanosecond however large both are.
+inline double seconds_between(Time b, Time a) {
+  return static_cast<double>(a.nanoseconds - b.nanoseconds) * 1e-9;
+}
+
+/// Decimal seconds with six digits, or nine where the stamp is finer than a microsecond: "1305031102.175304".
+std::string to_string(Time time);
+
+/// Parses decimal seconds ("1305031102.175304", "12", "-0.5", "1e3") without passing through a double where
+/// the text has no exponent. Empty where the text is not wholly a finite number in the range of int64
+/// nanoseconds.
+std::optional<Time> parse_time(std::string_view text);
+
+}  // namespace pade
