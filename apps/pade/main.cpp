@@ -5,10 +5,13 @@
 
 #include "pade/core/version.hpp"
 
+#include "commands.hpp"
+
 int main(int argc, char** argv) {
   CLI::App app("PADE: obstacle maps from one camera and a GPS/INS.", "pade");
   app.set_version_flag("--version", "pade " + std::string(pade::version));
   app.require_subcommand(1);
+  const pade::cli::Context context;
   CLI11_PARSE(app, argc, argv);
-  return 0;
+  return context.exit_code;
 }

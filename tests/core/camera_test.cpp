@@ -1,7 +1,7 @@
 #include "pade/core/camera.hpp"
 
 #include <cmath>
-#include <random>
+#include <string>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
@@ -73,7 +73,11 @@ TEST_P(CameraModels, UndistortionShowsTheIdealPinholeImage) {
   EXPECT_GT(checked, 8000);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, CameraModels, testing::ValuesIn(kCameras));
+std::string lens_name(const testing::TestParamInfo<Camera>& lens) {
+  constexpr const char* kNames[] = {"None", "PlumbBob", "PlumbBobWithK3", "RationalPolynomial", "Equidistant"};
+  return kNames[lens.index];
+}
+INSTANTIATE_TEST_SUITE_P(All, CameraModels, testing::ValuesIn(kCameras), lens_name);
 
 TEST(Camera, AKnownPlumbBobPointAgreesWithTheFormulaByHand) {
   const Camera camera = camera_with(Distortion::plumb_bob, {-0.3, 0.1, 0.001, -0.002, 0.02});

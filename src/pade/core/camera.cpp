@@ -64,7 +64,7 @@ double equidistant_limit(const Coefficients& c) {
 /// always does. Beyond it two scene points share a pixel, and the model means nothing.
 double radial_limit(const Coefficients& c) {
   constexpr double kFarthest = 20;  // 87 degrees off the axis
-  constexpr int kSteps = 2000;
+  constexpr int kSteps = 200;
   Coefficients radial = c;
   radial[2] = radial[3] = 0;
   for (int i = 1; i <= kSteps; ++i) {

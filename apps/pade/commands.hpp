@@ -1,0 +1,16 @@
+// The subcommands of `pade`. Each lives in the file of its name, adds itself to the application, and sets the
+// exit code when it is the one that was called: 0 done, 1 refused (the message is on standard error), 130
+// interrupted.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace pade::cli {
+
+struct Context {
+  int exit_code = 0;
+};
+
+// Listed in the order of the help text. Add a declaration here and a call in main.cpp for a new subcommand.
+
+}  // namespace pade::cli
