@@ -1,0 +1,68 @@
+// What navigation sensors deliver: plain values, stamped at the moment of measurement. Body frame FLU (x
+// forward, y left, z up), world frame local ENU (x east, y north, z up), SI units, radians.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "pade/core/time.hpp"
+
+namespace pade {
+
+/// One sample of a strapdown inertial measurement unit, at the body origin.
+struct ImuSample {
+  Time time;
+  Eigen::Vector3d angular_rate =
+      Eigen::Vector3d::Zero();  ///< of the body against the world, body axes, rad/s
+  Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();  ///< acceleration minus gravity, body axes, m/s²
+};
+
+/// A GNSS position of the antenna.
+struct GnssFix {
+  Time time;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();        ///< antenna, ENU, m
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< total error as the receiver reports it, m²
+};
+
+/// A GNSS velocity of the antenna (from Doppler or carrier differences); it has its own stamp.
+struct GnssVelocity {
+  Time time;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();        ///< antenna, ENU, m/s
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< (m/s)²
+};
+
+/// A barometric height above an unknown, slowly drifting zero.
+struct BarometricHeight {
+  Time time;
+  double height = 0;  ///< up, m
+  double sigma = 1;   ///< white part, m
+};
+
+/// The Earth's magnetic field in body axes.
+struct MagneticField {
+  Time time;
+  Eigen::Vector3d field = Eigen::Vector3d::Zero();  ///< body axes, any unit
+  double sigma = 0.05;  ///< white part per axis, as a fraction of the field's norm
+};
+
+/// The yaw of the body: angle of its x axis from east, towards north.
+struct Heading {
+  Time time;
+  double yaw = 0;      ///< rad
+  double sigma = 0.1;  ///< rad
+};
+
+/// The vehicle is known to stand still.
+struct ZeroVelocity {
+  Time time;
+  double sigma = 0.02;  ///< per axis, m/s
+};
+
+/// Distance along body -z to level ground.
+struct RangeToGround {
+  Time time;
+  double range = 0;          ///< m
+  double sigma = 0.05;       ///< m
+  double ground_height = 0;  ///< of the ground below, ENU, m
+};
+
+}  // namespace pade
