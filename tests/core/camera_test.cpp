@@ -74,7 +74,8 @@ TEST_P(CameraModels, UndistortionShowsTheIdealPinholeImage) {
 }
 
 std::string lens_name(const testing::TestParamInfo<Camera>& lens) {
-  constexpr const char* kNames[] = {"None", "PlumbBob", "PlumbBobWithK3", "RationalPolynomial", "Equidistant"};
+  constexpr const char* kNames[] = {"None", "PlumbBob", "PlumbBobWithK3", "RationalPolynomial",
+                                    "Equidistant"};
   return kNames[lens.index];
 }
 INSTANTIATE_TEST_SUITE_P(All, CameraModels, testing::ValuesIn(kCameras), lens_name);
