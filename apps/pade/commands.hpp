@@ -12,5 +12,6 @@ struct Context {
 };
 
 // Listed in the order of the help text. Add a declaration here and a call in main.cpp for a new subcommand.
+void add_flow(CLI::App& app, Context& context);
 
 }  // namespace pade::cli

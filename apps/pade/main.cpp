@@ -11,7 +11,8 @@ int main(int argc, char** argv) {
   CLI::App app("PADE: obstacle maps from one camera and a GPS/INS.", "pade");
   app.set_version_flag("--version", "pade " + std::string(pade::version));
   app.require_subcommand(1);
-  const pade::cli::Context context;
+  pade::cli::Context context;
+  pade::cli::add_flow(app, context);
   CLI11_PARSE(app, argc, argv);
   return context.exit_code;
 }

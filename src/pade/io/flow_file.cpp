@@ -1,0 +1,166 @@
+#include "pade/io/flow_file.hpp"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <string>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+
+namespace pade::io {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "flow files are little-endian");
+
+constexpr float kUnknownAbove = 1e9F;
+constexpr float kUnknown = 1.666666752e9F;
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr std::int32_t kLargestSide = 32768;
+constexpr std::size_t kHeaderBytes = 12;
+
+constexpr float kKittiScale = 64.0F;
+constexpr float kKittiOffset = 32768.0F;
+
+Result<std::vector<std::uint8_t>> read_bytes(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) return Error{fmt::format("{}: cannot be opened for reading", file.string())};
+  std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  if (stream.bad()) return Error{fmt::format("{}: reading failed", file.string())};
+  return bytes;
+}
+
+Status write_bytes(const std::filesystem::path& file, const std::vector<std::uint8_t>& bytes) {
+  std::filesystem::path part = file;
+  part += ".part";
+  std::ofstream stream(part, std::ios::binary);
+  stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  stream.close();
+  std::error_code failure;
+  if (!stream) {
+    std::filesystem::remove(part, failure);
+    return Error{fmt::format("{}: cannot be written", file.string())};
+  }
+  std::filesystem::rename(part, file, failure);
+  if (failure) return Error{fmt::format("{}: {}", file.string(), failure.message())};
+  return {};
+}
+
+}  // namespace
+
+Result<cv::Mat> decode_flo(std::span<const std::uint8_t> bytes, std::string_view name) {
+  if (bytes.size() < kHeaderBytes) {
+    return Error{fmt::format("{}: {} bytes, expected a .flo header of {}", name, bytes.size(), kHeaderBytes)};
+  }
+  if (std::memcmp(bytes.data(), "PIEH", 4) != 0) return Error{fmt::format("{}: no .flo tag 'PIEH'", name)};
+  std::int32_t width = 0;
+  std::int32_t height = 0;
+  std::memcpy(&width, bytes.data() + 4, 4);
+  std::memcpy(&height, bytes.data() + 8, 4);
+  if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide) {
+    return Error{fmt::format("{}: size {} x {}, expected 1 to {} each", name, width, height, kLargestSide)};
+  }
+  const std::size_t row_bytes = static_cast<std::size_t>(width) * sizeof(cv::Vec2f);
+  const std::size_t expected = kHeaderBytes + row_bytes * static_cast<std::size_t>(height);
+  if (bytes.size() != expected) {
+    return Error{
+        fmt::format("{}: {} bytes, expected {} for {} x {}", name, bytes.size(), expected, width, height)};
+  }
+  cv::Mat vectors(height, width, CV_32FC2);
+  std::memcpy(vectors.data, bytes.data() + kHeaderBytes, expected - kHeaderBytes);
+  vectors.forEach<cv::Vec2f>([](cv::Vec2f& w, const int*) {
+    // Written so that NaN is unknown too.
+    if (!(std::abs(w[0]) <= kUnknownAbove && std::abs(w[1]) <= kUnknownAbove)) w = {kNone, kNone};
+  });
+  return vectors;
+}
+
+std::vector<std::uint8_t> encode_flo(const cv::Mat& vectors) {
+  CV_Assert(vectors.type() == CV_32FC2 && !vectors.empty());
+  const std::int32_t size[2] = {vectors.cols, vectors.rows};
+  std::vector<std::uint8_t> bytes(kHeaderBytes + vectors.total() * sizeof(cv::Vec2f));
+  std::memcpy(bytes.data(), "PIEH", 4);
+  std::memcpy(bytes.data() + 4, size, 8);
+  std::uint8_t* to = bytes.data() + kHeaderBytes;
+  for (int v = 0; v < vectors.rows; ++v) {
+    for (int u = 0; u < vectors.cols; ++u, to += sizeof(cv::Vec2f)) {
+      cv::Vec2f w = vectors.at<cv::Vec2f>(v, u);
+      if (!(std::abs(w[0]) <= kUnknownAbove && std::abs(w[1]) <= kUnknownAbove)) w = {kUnknown, kUnknown};
+      std::memcpy(to, w.val, sizeof(cv::Vec2f));
+    }
+  }
+  return bytes;
+}
+
+Result<cv::Mat> decode_kitti_flow(std::span<const std::uint8_t> bytes, std::string_view name) {
+  cv::Mat png;
+  try {  // the decoder throws on absurd sizes
+    if (!bytes.empty()) {
+      const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1,
+                           const_cast<std::uint8_t*>(bytes.data()));
+      png = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
+    }
+  } catch (const cv::Exception& failure) {
+    return Error{fmt::format("{}: {}", name, failure.err)};
+  }
+  if (png.empty()) return Error{fmt::format("{}: not a readable PNG", name)};
+  if (png.type() != CV_16UC3) {
+    return Error{fmt::format("{}: {} channels of {} bytes, expected a KITTI flow PNG with 3 of 2", name,
+                             png.channels(), png.elemSize1())};
+  }
+  cv::Mat vectors(png.size(), CV_32FC2);
+  for (int v = 0; v < png.rows; ++v) {
+    for (int u = 0; u < png.cols; ++u) {
+      const auto& code = png.at<cv::Vec3w>(v, u);  // BGR: valid, v, u
+      vectors.at<cv::Vec2f>(v, u) =
+          code[0] == 0 ? cv::Vec2f(kNone, kNone)
+                       : cv::Vec2f((static_cast<float>(code[2]) - kKittiOffset) / kKittiScale,
+                                   (static_cast<float>(code[1]) - kKittiOffset) / kKittiScale);
+    }
+  }
+  return vectors;
+}
+
+std::vector<std::uint8_t> encode_kitti_flow(const cv::Mat& vectors) {
+  CV_Assert(vectors.type() == CV_32FC2 && !vectors.empty());
+  cv::Mat png(vectors.size(), CV_16UC3, cv::Scalar::all(0));
+  for (int v = 0; v < png.rows; ++v) {
+    for (int u = 0; u < png.cols; ++u) {
+      const cv::Vec2f code =
+          vectors.at<cv::Vec2f>(v, u) * kKittiScale + cv::Vec2f(kKittiOffset, kKittiOffset);
+      const bool fits = code[0] > -0.5F && code[1] > -0.5F && code[0] < 65535.5F && code[1] < 65535.5F;
+      if (!fits) continue;
+      png.at<cv::Vec3w>(v, u) = {1, static_cast<std::uint16_t>(std::lround(code[1])),
+                                 static_cast<std::uint16_t>(std::lround(code[0]))};
+    }
+  }
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", png, bytes);
+  return bytes;
+}
+
+Result<cv::Mat> read_flow(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  if (ending != ".flo" && ending != ".png") {
+    return Error{fmt::format("{}: flow files end in .flo or .png", file.string())};
+  }
+  const Result<std::vector<std::uint8_t>> bytes = read_bytes(file);
+  if (!bytes) return bytes.error();
+  return ending == ".flo" ? decode_flo(*bytes, file.string()) : decode_kitti_flow(*bytes, file.string());
+}
+
+Status write_flow(const std::filesystem::path& file, const cv::Mat& vectors) {
+  if (vectors.type() != CV_32FC2 || vectors.empty()) {
+    return Error{fmt::format("{}: the flow to write is empty or not of type CV_32FC2", file.string())};
+  }
+  const std::string ending = file.extension().string();
+  if (ending == ".flo") return write_bytes(file, encode_flo(vectors));
+  if (ending == ".png") return write_bytes(file, encode_kitti_flow(vectors));
+  return Error{fmt::format("{}: flow files end in .flo or .png", file.string())};
+}
+
+}  // namespace pade::io
