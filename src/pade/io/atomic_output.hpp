@@ -1,0 +1,74 @@
+// Output that appears whole or not at all: written beside its place, renamed at the end, and removed on an
+// error or on Ctrl-C.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "pade/core/result.hpp"
+
+namespace pade::io {
+
+/// What to do where the output exists already.
+enum class Overwrite {
+  refuse,   ///< an error, before any work is done
+  replace,  ///< the old output stays until the new one is complete
+};
+
+/// From now on SIGINT and SIGTERM set a flag instead of ending the process (a second signal ends it at once),
+/// and SIGXFSZ is ignored, so that a file-size limit is a write error like any other. Called once by a
+/// program, never by the library. Signals that were ignored at the start (nohup) stay ignored.
+void watch_for_interrupts();
+/// True after SIGINT or SIGTERM. Loops that take more than a moment poll it, leave, and let the destructors
+/// clean up.
+bool interrupted();
+/// The error that a loop returns when it leaves because of interrupted().
+Error interrupted_error();
+
+/// A folder that appears at its place with commit(), or never. Until then everything lies in a hidden folder
+/// beside it; the destructor removes what was not committed.
+class OutputFolder {
+ public:
+  /// Refuses an existing `target` (unless `overwrite` is replace and it is empty or holds a file `marker`, so
+  /// that a slip of the keyboard never removes a folder of another kind), and a parent that cannot be written
+  /// to. Missing parents are made.
+  static Result<OutputFolder> create(const std::filesystem::path& target, Overwrite overwrite,
+                                     std::string_view marker);
+
+  OutputFolder(OutputFolder&& other) noexcept;
+  OutputFolder& operator=(OutputFolder&& other) noexcept;
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+  ~OutputFolder();
+
+  /// Where the folder will be.
+  [[nodiscard]] const std::filesystem::path& target() const { return target_; }
+  /// Where a file of the folder is to be written now; its sub-folder is made. For writers that take a path.
+  Result<std::filesystem::path> place(const std::filesystem::path& relative) const;
+  /// Writes a file of the folder; every byte is checked.
+  Status write(const std::filesystem::path& relative, std::string_view content) const;
+  Status write(const std::filesystem::path& relative, std::span<const unsigned char> content) const;
+
+  /// Moves the folder to its place, replacing an old one in one step where the file system can.
+  Status commit();
+
+ private:
+  OutputFolder() = default;
+  void discard();
+
+  std::filesystem::path target_;
+  std::filesystem::path temporary_;        // empty once committed or moved from
+  std::filesystem::path created_parents_;  // topmost parent that create() made; empty = none
+  Overwrite overwrite_ = Overwrite::refuse;
+};
+
+/// Writes a single file beside its place and renames it. `path` may be a device such as /dev/stdout, which is
+/// written to directly.
+Status write_file(const std::filesystem::path& path, std::string_view content, Overwrite overwrite);
+
+/// The content of a file.
+Result<std::string> read_file(const std::filesystem::path& path);
+
+}  // namespace pade::io

@@ -1,0 +1,82 @@
+// The options structs of every stage (core/options.hpp) as JSON in run.json and as YAML in configuration
+// files, by one list of fields.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
+
+namespace pade::io {
+
+/// An enumeration behind its names.
+struct EnumField {
+  std::function<std::string_view()> get;
+  std::function<bool(std::string_view)> set;  ///< false where the name does not exist
+  std::vector<std::string_view> names;
+};
+
+/// One field of an options struct: its name, what it means, and where its value lives.
+struct OptionField {
+  std::string name;
+  std::string help;
+  std::variant<bool*, int*, double*, std::string*, EnumField, std::vector<OptionField>> value;
+};
+using OptionFields = std::vector<OptionField>;
+
+/// The fields of `options` in the order of its visit(). They point into `options`, which must outlive them.
+template <OptionStruct Options>
+OptionFields option_fields(Options& options) {
+  OptionFields fields;
+  Options::visit(options, [&fields]<class Value>(std::string_view name, Value& value, std::string_view help) {
+    OptionField field{std::string(name), std::string(help), {}};
+    if constexpr (OptionStruct<Value>) {
+      field.value = option_fields(value);
+    } else if constexpr (NamedEnum<Value>) {
+      EnumField access;
+      access.get = [&value] { return to_name(value); };
+      access.set = [&value](std::string_view text) {
+        const auto parsed = from_name<Value>(text);
+        if (parsed) value = *parsed;
+        return parsed.has_value();
+      };
+      for (const auto& entry : EnumNames<Value>::names) access.names.push_back(entry.second);
+      field.value = std::move(access);
+    } else {
+      static_assert(std::is_same_v<Value, bool> || std::is_same_v<Value, int> ||
+                        std::is_same_v<Value, double> || std::is_same_v<Value, std::string>,
+                    "options are bool, int, double, std::string, named enumerations and nested options");
+      field.value = &value;
+    }
+    fields.push_back(std::move(field));
+  });
+  return fields;
+}
+
+/// The values as a JSON object, in the order of the fields. `indent` spaces per level; negative = one line.
+std::string to_json(const OptionFields& fields, int indent = -1);
+template <OptionStruct Options>
+std::string to_json(const Options& options, int indent = -1) {
+  Options copy = options;
+  return to_json(option_fields(copy), indent);
+}
+
+/// Sets the fields that a YAML (or JSON) mapping names; the others keep their values. Refused, with nothing
+/// changed: text that is not a mapping, an unknown field, a value of another type. `file` is what messages
+/// call the text.
+Status from_yaml(std::string_view text, std::string_view file, const OptionFields& fields);
+template <OptionStruct Options>
+Status from_yaml(std::string_view text, std::string_view file, Options& options) {
+  Options copy = options;
+  Status status = from_yaml(text, file, option_fields(copy));
+  if (status) options = std::move(copy);
+  return status;
+}
+
+}  // namespace pade::io

@@ -1,0 +1,99 @@
+// What a run says about itself: run.json and timing.json of the run folder (docs/design.md, "Files that
+// people meet").
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pade/core/camera.hpp"
+#include "pade/core/depth_image.hpp"
+#include "pade/core/result.hpp"
+#include "pade/io/skipped.hpp"
+
+namespace pade::io {
+
+/// How much of the input was usable.
+struct RunHealth {
+  int frames = 0;                     ///< images of the sequence
+  int frames_used = 0;                ///< images that had a pose and could be decoded
+  int depth_images = 0;               ///< pairs of frames that gave a depth image
+  std::vector<Skipped> skipped;       ///< in the order of the sequence
+  std::vector<std::string> warnings;  ///< what a user should know, one sentence each
+};
+
+/// Where the origin of the map's world lies on the earth (WGS-84).
+struct GeographicOrigin {
+  double latitude = 0;   ///< degrees
+  double longitude = 0;  ///< degrees
+  double height = 0;     ///< metres above the ellipsoid
+};
+
+/// The axis of the pose world that points up.
+struct WorldUp {
+  std::string axis = "+z";  ///< one of +x -x +y -y +z -z
+  std::string source;       ///< "camera.yaml", "command line" or "mean camera-down axis"
+};
+
+/// What the occupancy map holds.
+struct MapSummary {
+  double voxel = 0;  ///< edge of a voxel, metres
+  std::uint64_t occupied_voxels = 0;
+  std::uint64_t free_voxels = 0;
+};
+
+/// run.json.
+struct RunInfo {
+  std::string version;             ///< of the program that wrote the run
+  std::filesystem::path sequence;  ///< absolute
+  std::string poses;               ///< name of the pose file
+  std::string options = "{}";      ///< JSON object, from to_json(options)
+  Camera camera;                   ///< of the undistorted images
+  int window = 1;                  ///< n: one depth per n x n pixels (the stacks have full size all the same)
+  double range_limit = 0;          ///< metres; depth beyond is none. 0 = no limit
+  RunHealth health;
+  WorldUp world_up;
+  std::optional<GeographicOrigin> origin;
+  std::optional<MapSummary> map;
+
+  // Filled by RunWriter.
+  double depth_scale = 0;                          ///< counts per metre of depth/<time>.png
+  double sigma_scale = 0;                          ///< counts per metre of sigma/<time>.png
+  std::vector<std::string> stacks;                 ///< of depth, sigma, state, flow: those that were saved
+  std::array<std::uint64_t, 6> state_pixels = {};  ///< pixels (cells) of each DepthState over the run
+};
+
+/// Wall time of one stage over a run, milliseconds per frame.
+struct StageTiming {
+  std::string stage;
+  std::uint64_t count = 0;
+  double mean = 0, p50 = 0, p99 = 0, max = 0;
+};
+
+/// timing.json: the only file of a run that differs between two runs of the same input.
+struct RunTiming {
+  std::vector<StageTiming> stages;  ///< in the order of the pipeline; "total" is a frame's latency
+  double frames_per_second = 0;     ///< frames over wall time of the whole run, reading and writing included
+  std::uint64_t peak_memory = 0;    ///< bytes of resident memory
+};
+
+/// Percentiles by nearest rank. Empty input gives count 0.
+StageTiming summarise(std::string_view stage, std::vector<double> milliseconds);
+/// Largest resident memory of this process so far, bytes.
+std::uint64_t peak_memory();
+
+/// The counts per metre of a 16-bit image that must hold `range` metres: the largest whole number that fits.
+/// Without a limit (range not positive or infinite): 500, for 131 m.
+double scale_for_range(double range);
+
+std::string to_json(const RunInfo& info);
+std::string to_json(const RunTiming& timing);
+/// `file` is what messages call the text.
+Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file);
+Result<RunTiming> run_timing_from_json(std::string_view text, std::string_view file);
+
+}  // namespace pade::io
