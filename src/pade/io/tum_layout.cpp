@@ -1,0 +1,96 @@
+// The TUM RGB-D layout: rgb/, depth/, rgb.txt, depth.txt or associations.txt, groundtruth.txt, camera.yaml.
+#include <algorithm>
+#include <cctype>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "pade/io/sequence_layout.hpp"
+#include "pade/io/text.hpp"
+
+namespace pade::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Lists `time file` in columns `column` and `column` + 1.
+Result<std::vector<StampedFile>> read_list(const fs::path& folder, const char* name, std::size_t column,
+                                           ReadReport& report) {
+  const auto text = read_text(folder / name);
+  if (!text) return text.error();
+  std::vector<StampedFile> files;
+  for (const Line& line : data_lines(*text)) {
+    const auto fields = split_fields(line.text);
+    const auto time = column < fields.size() ? parse_time(fields[column]) : std::nullopt;
+    if (!time || column + 1 >= fields.size() || fields[column + 1].empty()) {
+      report.skip((folder / name).string(),
+                  fmt::format("line {}: found {}, expected a time in seconds and a file name", line.number,
+                              in_quotes(line.text)));
+      continue;
+    }
+    files.push_back({*time, folder / fields[column + 1]});
+  }
+  return files;
+}
+
+/// Image files whose names are their times.
+std::vector<StampedFile> files_named_by_time(const fs::path& folder, ReadReport& report) {
+  std::vector<StampedFile> files;
+  for (const fs::path& file : image_files(folder)) {
+    const std::string stem = file.stem().string();
+    if (const auto time = parse_time(stem)) {
+      files.push_back({*time, file});
+    } else {
+      report.skip(file.string(), fmt::format("found name {}, expected the time in seconds", in_quotes(stem)));
+    }
+  }
+  return files;
+}
+
+Result<std::vector<StampedFile>> list_images(const fs::path& folder, const char* kind, std::size_t column,
+                                             ReadReport& report) {
+  const std::string list = fmt::format("{}.txt", kind);
+  if (path_exists(folder / list)) return read_list(folder, list.c_str(), 0, report);
+  if (path_exists(folder / "associations.txt")) return read_list(folder, "associations.txt", column, report);
+  return files_named_by_time(folder / kind, report);
+}
+
+fs::path pose_file(const fs::path& folder, const std::string& poses) {
+  if (poses == "groundtruth") return folder / "groundtruth.txt";
+  if (poses == "original") return folder / "groundtruth_original.txt";
+  return poses;
+}
+
+}  // namespace
+
+Result<SequenceListing> read_tum_layout(const fs::path& folder, const LayoutChoice& choice,
+                                        ReadReport& report) {
+  SequenceListing listing;
+  listing.layout = "TUM RGB-D";
+  auto calibration = layout_calibration(folder, folder / "camera.yaml", choice, report);
+  if (!calibration) return calibration.error();
+  listing.calibration = std::move(*calibration);
+
+  auto images = list_images(folder, "rgb", 0, report);
+  if (!images) return images.error();
+  listing.images = std::move(*images);
+  if (path_exists(folder / "depth") || path_exists(folder / "depth.txt")) {
+    auto depth = list_images(folder, "depth", 2, report);
+    if (!depth) return depth.error();
+    listing.depth = std::move(*depth);
+  }
+
+  listing.pose_file = pose_file(folder, choice.poses);
+  auto trajectory = read_trajectory(listing.pose_file, report);
+  if (!trajectory) return trajectory.error();
+  listing.trajectory = std::move(*trajectory);
+  listing.poses_of_body = listing.calibration.pose_convention == PoseConvention::body_to_world;
+  if (listing.calibration.T_body_camera && !listing.calibration.pose_convention) {
+    report.notes.emplace_back(
+        "T_body_camera is given without pose_convention: the poses are taken as the camera's "
+        "(camera_to_world_optical); write body_to_world where they are the body's");
+  }
+  return listing;
+}
+
+}  // namespace pade::io
