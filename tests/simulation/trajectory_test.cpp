@@ -1,0 +1,146 @@
+#include "pade/simulation/trajectory.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace pade::simulation {
+namespace {
+
+std::vector<Waypoint> slalom() {
+  return {{{0, 0, 2}, 0.1, {}},
+          {{6, 2, 2.5}, 0.4, {}},
+          {{12, -2, 3}, -0.3, {}},
+          {{18, 1, 2}, 0, {}},
+          {{25, 0, 2}, 3, {}}};
+}
+
+Trajectory flown(const std::vector<Waypoint>& waypoints, const TrajectoryOptions& options = {}) {
+  auto path = Trajectory::through(waypoints, options);
+  EXPECT_TRUE(path.ok()) << (path.ok() ? "" : path.error().message);
+  return std::move(path).value();
+}
+
+TEST(Trajectory, PassesThroughItsWaypoints) {
+  const auto waypoints = slalom();
+  const Trajectory path = flown(waypoints);
+  ASSERT_EQ(path.waypoint_times().size(), waypoints.size());
+  for (std::size_t i = 0; i < waypoints.size(); ++i) {
+    const KinematicState state = path.at(path.waypoint_times()[i]);
+    EXPECT_LT((state.position - waypoints[i].position).norm(), 1e-9);
+  }
+}
+
+TEST(Trajectory, IsSmoothToTheSixthDerivativeAtWaypoints) {
+  for (const PathEnd end : {PathEnd::moving, PathEnd::rest}) {
+    TrajectoryOptions options;
+    options.start = options.end = end;
+    const Trajectory path = flown(slalom(), options);
+    for (std::size_t i = 1; i + 1 < path.waypoint_times().size(); ++i) {
+      const double t = path.waypoint_times()[i];
+      for (int order = 0; order <= 6; ++order) {
+        const Eigen::Vector4d before = path.derivative(std::nextafter(t, 0.0), order);
+        const Eigen::Vector4d after = path.derivative(t, order);
+        EXPECT_LT((after - before).norm(), 1e-7 * (1 + after.norm())) << "order " << order;
+      }
+    }
+  }
+}
+
+TEST(Trajectory, StraightLineIsFlownAtConstantSpeed) {
+  for (const int points : {2, 3, 4, 6}) {
+    std::vector<Waypoint> line;
+    for (int i = 0; i < points; ++i) line.push_back({{3.0 * i, 1.0 * i, 2}, 0.5, {}});
+    TrajectoryOptions options;
+    options.speed = 2;
+    const Trajectory path = flown(line, options);
+    for (double t = 0; t <= path.duration(); t += 0.1) {
+      const KinematicState state = path.at(t);
+      EXPECT_NEAR(state.velocity.norm(), 2, 1e-9);
+      EXPECT_LT(state.acceleration.norm(), 1e-8);
+      EXPECT_LT(state.angular_velocity.norm(), 1e-8);
+    }
+  }
+}
+
+TEST(Trajectory, VelocityAccelerationAndAngularRateAreTheDerivativesOfThePose) {
+  TrajectoryOptions options;
+  options.drag = 0.2;
+  options.roll = {0.1, 3, 0.2};
+  options.pitch = {0.05, 2, 0};
+  options.yaw = {0.2, 5, 1};
+  for (const Heading heading : {Heading::waypoint, Heading::path}) {
+    options.heading = heading;
+    const Trajectory path = flown(slalom(), options);
+    constexpr double h = 1e-4;
+    for (double t = 0.1; t < path.duration() - 0.1; t += 0.37) {
+      const KinematicState before = path.at(t - h);
+      const KinematicState now = path.at(t);
+      const KinematicState after = path.at(t + h);
+      const Eigen::Vector3d velocity = (after.position - before.position) / (2 * h);
+      EXPECT_LT((velocity - now.velocity).norm(), 1e-6);
+      EXPECT_LT(((after.velocity - before.velocity) / (2 * h) - now.acceleration).norm(), 1e-6);
+      const Eigen::Vector3d rate =
+          rotation_log(Eigen::Quaterniond(before.R_world_body.conjugate() * after.R_world_body)) / (2 * h);
+      EXPECT_LT((rate - now.angular_velocity).norm(), 1e-6) << "at " << t;
+    }
+  }
+}
+
+TEST(Trajectory, ThrustPointsAlongBodyZ) {
+  const Trajectory path = flown(slalom());
+  for (double t = 0; t < path.duration(); t += 0.21) {
+    const KinematicState state = path.at(t);
+    const Eigen::Vector3d force =
+        state.R_world_body.conjugate() * (state.acceleration + Eigen::Vector3d(0, 0, 9.80665));
+    EXPECT_LT(force.head<2>().norm(), 1e-9);
+    EXPECT_GT(force.z(), 5);
+  }
+}
+
+TEST(Trajectory, StartsAndEndsAtRestOnRequest) {
+  TrajectoryOptions options;
+  options.start = options.end = PathEnd::rest;
+  const Trajectory path = flown(slalom(), options);
+  for (const double t : {0.0, path.duration()}) {
+    EXPECT_LT(path.at(t).velocity.norm(), 1e-9);
+    EXPECT_LT(path.at(t).acceleration.norm(), 1e-8);
+  }
+}
+
+TEST(Trajectory, HeadingFollowsThePath) {
+  TrajectoryOptions options;
+  options.heading = Heading::path;
+  const Trajectory path = flown(slalom(), options);
+  for (double t = 0; t < path.duration(); t += 0.3) {
+    const KinematicState state = path.at(t);
+    const Eigen::Vector3d left = state.R_world_body * Eigen::Vector3d::UnitY();
+    const Eigen::Vector3d horizontal(state.velocity.x(), state.velocity.y(), 0);
+    EXPECT_NEAR(left.dot(horizontal), 0, 1e-9);
+  }
+}
+
+TEST(Trajectory, RefusesWhatTheVehicleCannotFly) {
+  const auto refused = [](const std::vector<Waypoint>& waypoints, const TrajectoryOptions& options) {
+    const auto path = Trajectory::through(waypoints, options);
+    return path.ok() ? std::string("accepted") : path.error().message;
+  };
+  TrajectoryOptions fast;
+  fast.limits.speed = 1;
+  EXPECT_THAT(refused(slalom(), fast), testing::HasSubstr("speed between waypoints"));
+  TrajectoryOptions gentle;
+  gentle.limits.acceleration = 0.1;
+  EXPECT_THAT(refused(slalom(), gentle), testing::HasSubstr("acceleration between waypoints"));
+  EXPECT_THAT(refused({slalom()[0]}, {}), testing::HasSubstr("expected 2"));
+  EXPECT_THAT(refused({slalom()[0], slalom()[0]}, {}), testing::HasSubstr("waypoint 2"));
+  EXPECT_THAT(refused({{{0, 0, 0}, 0, {}}, {{1, 0, std::nan("")}, 0, {}}}, {}),
+              testing::HasSubstr("not finite"));
+  EXPECT_THAT(refused({{{0, 0, 0}, 0, {}}, {{1, 0, 0}, 0, -1}}, {}),
+              testing::HasSubstr("expected more than"));
+}
+
+}  // namespace
+}  // namespace pade::simulation
