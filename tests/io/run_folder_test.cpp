@@ -58,7 +58,7 @@ RunInfo some_info(cv::Size size) {
   info.camera.fx = info.camera.fy = 21.5;
   info.window = 2;
   info.health = {5, 4, 3, {{"rgb/3.png", "found 0 bytes"}}, {"world_up is a guess"}};
-  info.world_up = {"-y", "camera.yaml"};
+  info.world_up = WorldUp{{0, -1, 0}, true};
   info.origin = GeographicOrigin{48.1, 11.6, 519.0};
   info.map = MapSummary{0.1, 123, 4567};
   return info;
@@ -158,9 +158,11 @@ TEST(RunFolderFiles, SayWhatTheRunSaysAboutItself) {
   ASSERT_EQ(info.health.skipped.size(), 1U);
   EXPECT_EQ(info.health.skipped[0].reason, "found 0 bytes");
   EXPECT_THAT(info.health.warnings, ElementsAre("world_up is a guess"));
-  EXPECT_EQ(info.world_up.axis, "-y");
+  ASSERT_TRUE(info.world_up.has_value());
+  EXPECT_EQ(info.world_up->direction, Eigen::Vector3d(0, -1, 0));
+  EXPECT_TRUE(info.world_up->stated);
   ASSERT_TRUE(info.origin.has_value());
-  EXPECT_EQ(info.origin->latitude, 48.1);
+  EXPECT_EQ(info.origin->latitude_deg, 48.1);
   ASSERT_TRUE(info.map.has_value());
   EXPECT_EQ(info.map->free_voxels, 4567U);
   EXPECT_EQ(info.state_pixels[0], 80U);

@@ -97,6 +97,11 @@ class Fields {
       return json.is_array() &&
              std::all_of(json.begin(), json.end(), [](const Json& item) { return item.is_string(); });
     }
+    if constexpr (std::is_same_v<Value, bool>) return json.is_boolean();
+    if constexpr (std::is_same_v<Value, std::vector<double>>) {
+      return json.size() == 3 &&
+             std::all_of(json.begin(), json.end(), [](const Json& item) { return item.is_number(); });
+    }
     if constexpr (std::is_same_v<Value, Json>) return json.is_object();
     return false;
   }
@@ -145,11 +150,20 @@ void read_health(Fields fields, RunHealth& health) {
 }
 
 void read_optional_parts(Fields& fields, RunInfo& info) {
+  if (fields.has("world_up")) {
+    Fields up = fields.object("world_up");
+    std::vector<double> direction;
+    info.world_up.emplace();
+    up.read("direction", direction, "three numbers");
+    up.read("stated", info.world_up->stated, "true or false");
+    if (direction.size() == 3)
+      info.world_up->direction = Eigen::Vector3d(direction[0], direction[1], direction[2]);
+  }
   if (fields.has("geographic_origin")) {
     Fields origin = fields.object("geographic_origin");
     info.origin.emplace();
-    origin.read("latitude_deg", info.origin->latitude, "degrees");
-    origin.read("longitude_deg", info.origin->longitude, "degrees");
+    origin.read("latitude_deg", info.origin->latitude_deg, "degrees");
+    origin.read("longitude_deg", info.origin->longitude_deg, "degrees");
     origin.read("height_m", info.origin->height, "metres");
   }
   if (fields.has("map")) {
@@ -211,16 +225,20 @@ std::string to_json(const RunInfo& info) {
                {"window", info.window},
                {"range_limit_m", info.range_limit},
                {"health", json_of(info.health)},
-               {"world_up", {{"axis", info.world_up.axis}, {"source", info.world_up.source}}},
+               {"world_up", nullptr},
                {"geographic_origin", nullptr},
                {"map", nullptr},
                {"stacks", info.stacks},
                {"depth_scale", info.depth_scale},
                {"sigma_scale", info.sigma_scale},
                {"states", json_of_states(info.state_pixels)}};
+  if (info.world_up) {
+    const Eigen::Vector3d& up = info.world_up->direction;
+    json["world_up"] = {{"direction", {up.x(), up.y(), up.z()}}, {"stated", info.world_up->stated}};
+  }
   if (info.origin) {
-    json["geographic_origin"] = {{"latitude_deg", info.origin->latitude},
-                                 {"longitude_deg", info.origin->longitude},
+    json["geographic_origin"] = {{"latitude_deg", info.origin->latitude_deg},
+                                 {"longitude_deg", info.origin->longitude_deg},
                                  {"height_m", info.origin->height}};
   }
   if (info.map) {
@@ -252,9 +270,6 @@ Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file)
   fields.read("window", info.window, "a whole number");
   fields.read("range_limit_m", info.range_limit, "metres");
   read_health(fields.object("health"), info.health);
-  Fields up = fields.object("world_up");
-  up.read("axis", info.world_up.axis, "one of +x -x +y -y +z -z");
-  up.read("source", info.world_up.source, "text");
   read_optional_parts(fields, info);
   fields.read("stacks", info.stacks, "a list of names");
   fields.read("depth_scale", info.depth_scale, "counts per metre");

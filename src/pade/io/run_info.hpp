@@ -13,6 +13,8 @@
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
 #include "pade/core/result.hpp"
+#include "pade/io/calibration.hpp"
+#include "pade/io/sequence.hpp"
 #include "pade/io/skipped.hpp"
 
 namespace pade::io {
@@ -24,19 +26,6 @@ struct RunHealth {
   int depth_images = 0;               ///< pairs of frames that gave a depth image
   std::vector<Skipped> skipped;       ///< in the order of the sequence
   std::vector<std::string> warnings;  ///< what a user should know, one sentence each
-};
-
-/// Where the origin of the map's world lies on the earth (WGS-84).
-struct GeographicOrigin {
-  double latitude = 0;   ///< degrees
-  double longitude = 0;  ///< degrees
-  double height = 0;     ///< metres above the ellipsoid
-};
-
-/// The axis of the pose world that points up.
-struct WorldUp {
-  std::string axis = "+z";  ///< one of +x -x +y -y +z -z
-  std::string source;       ///< "camera.yaml", "command line" or "mean camera-down axis"
 };
 
 /// What the occupancy map holds.
@@ -56,7 +45,7 @@ struct RunInfo {
   int window = 1;                  ///< n: one depth per n x n pixels (the stacks have full size all the same)
   double range_limit = 0;          ///< metres; depth beyond is none. 0 = no limit
   RunHealth health;
-  WorldUp world_up;
+  std::optional<WorldUp> world_up;  ///< empty where nobody said and the cameras do not agree
   std::optional<GeographicOrigin> origin;
   std::optional<MapSummary> map;
 
