@@ -1,0 +1,275 @@
+#include "pade/depth/depth_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pade/depth/depth_kernel.hpp"
+#include "pade/depth/derotation.hpp"
+#include "pade/depth/texture.hpp"
+
+namespace pade::depth {
+namespace {
+
+constexpr double kMedianToSigma = 1.4826;
+constexpr double kLeastFlowSigma = 0.01;   // px; no flow method is better, and thresholds need a scale
+constexpr double kUnknownFlowSigma = 0.5;  // px, where too few pixels are left to measure it
+constexpr std::size_t kFewestSamples = 50;
+constexpr int kSampleStep = 4;        // px between the pixels that measure flow noise and focus of expansion
+constexpr double kFarthestFocus = 3;  // image diagonals from the centre; beyond, the flow is parallel
+constexpr double kLeastForwardShare = 0.05;  // of the translation; less is not forward motion
+
+static_assert(static_cast<int>(DepthState::epipole) == 1 && static_cast<int>(DepthState::low_parallax) == 2 &&
+              static_cast<int>(DepthState::no_texture) == 3 &&
+              static_cast<int>(DepthState::inconsistent) == 4 &&
+              static_cast<int>(DepthState::out_of_view) == 5);  // the kernel's constants
+
+constexpr auto kOutOfView = static_cast<std::uint8_t>(DepthState::out_of_view);
+
+/// Robust standard deviation of the flow across the epipolar lines: zero for the right pose and perfect flow,
+/// at any depth, so it measures the noise of one component of the flow (and the error of the pose with it).
+double across_sigma(const std::vector<FlowSample>& samples, const Camera& camera, const Eigen::Vector3d& t) {
+  std::vector<double> residuals;
+  residuals.reserve(samples.size());
+  for (const FlowSample& s : samples) {
+    const Eigen::Vector2d a = times_A(camera, s.position, t);
+    const double length = a.norm();
+    if (length > 0) residuals.push_back(std::abs(a.x() * s.flow.y() - a.y() * s.flow.x()) / length);
+  }
+  if (residuals.size() < kFewestSamples) return kUnknownFlowSigma;
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  return std::max(kLeastFlowSigma, kMedianToSigma * *middle);
+}
+
+void copy_turn(const Eigen::Matrix3d& rotation, float* turn) {
+  const Eigen::Matrix3d difference = rotation - Eigen::Matrix3d::Identity();
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) turn[3 * r + c] = static_cast<float>(difference(r, c));
+  }
+}
+
+KernelParameters kernel_parameters(const DepthInput& input, const DepthOptions& options,
+                                   const Eigen::Vector3d& t, double sigma, double axis_variance) {
+  const Camera& camera = input.camera;
+  KernelParameters k{};
+  k.fx = static_cast<float>(camera.fx);
+  k.fy = static_cast<float>(camera.fy);
+  k.inverse_fx = static_cast<float>(1 / camera.fx);
+  k.inverse_fy = static_cast<float>(1 / camera.fy);
+  k.fx_tx = static_cast<float>(camera.fx * t.x());
+  k.fy_ty = static_cast<float>(camera.fy * t.y());
+  k.tz = static_cast<float>(t.z());
+  copy_turn(input.motion.R_reference_other, k.turn);
+  copy_turn(input.motion.R_reference_other.transpose(), k.view);
+  const Eigen::Vector3d omega = input.motion.rotation_vector();
+  for (int i = 0; i < 3; ++i) k.omega[i] = static_cast<float>(omega[i]);
+  k.add_tz = options.model == Model::exact ? k.tz : 0.0F;
+  k.sigma2 = static_cast<float>(sigma * sigma);
+  k.parallax2 = static_cast<float>(options.parallax_gate * options.parallax_gate);
+  k.residual2 = static_cast<float>(options.residual_gate * options.residual_gate);
+  k.tangent2 = static_cast<float>(std::pow(std::tan(options.residual_angle), 2));
+  const double gate = options.parallax_gate * sigma;
+  const double least = gate * std::max(options.nearest - t.z(), 0.1 * options.nearest);
+  k.epipole2 = static_cast<float>(least * least);
+  // Where even the best-placed pixel has no parallax the camera hardly moved; no pixel is special then.
+  const bool moved = std::max(camera.fx, camera.fy) * t.norm() >= least;
+  k.epipole_state = static_cast<std::uint8_t>(moved ? DepthState::epipole : DepthState::low_parallax);
+  k.range = static_cast<float>(options.range);
+  k.axis_variance = static_cast<float>(axis_variance);
+  k.left = static_cast<float>(-camera.cx);
+  k.right = static_cast<float>(camera.width - 1 - camera.cx);
+  k.top = static_cast<float>(-camera.cy);
+  k.bottom = static_cast<float>(camera.height - 1 - camera.cy);
+  int index = 0;
+  for (int r = 0; r < 6; ++r) {
+    for (int c = r; c < 6; ++c) k.pose[index++] = static_cast<float>(input.motion.covariance(r, c));
+  }
+  k.has_pose = !input.motion.covariance.isZero(0);
+  k.samelson = options.reading == Reading::samelson;
+  k.derotation = input.derotation == Derotation::image ? KernelDerotation::none
+                 : options.model == Model::exact       ? KernelDerotation::exact
+                                                       : KernelDerotation::first_order;
+  return k;
+}
+
+/// A measured pixel whose match falls on a pixel that the other frame does not see is out of view.
+void hide_invalid_matches(const DepthInput& input, const KernelParameters& k, int n, const FlowField& flow,
+                          DepthImage& out) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (int r = 0; r < out.depth.rows; ++r) {
+    auto* state = out.state.ptr<std::uint8_t>(r);
+    for (int c = 0; c < out.depth.cols; ++c) {
+      if (state[c] != static_cast<std::uint8_t>(DepthState::measured)) continue;
+      const auto& w = flow.vectors.at<cv::Vec2f>(r, c);
+      double u = cell_centre(c, n) + static_cast<double>(w[0]);
+      double v = cell_centre(r, n) + static_cast<double>(w[1]);
+      if (k.derotation == KernelDerotation::none) {
+        const Eigen::Vector3d ray((u - input.camera.cx) / input.camera.fx,
+                                  (v - input.camera.cy) / input.camera.fy, 1);
+        const Eigen::Vector3d seen = input.motion.R_reference_other.transpose() * ray;
+        u = input.camera.fx * seen.x() / seen.z() + input.camera.cx;
+        v = input.camera.fy * seen.y() / seen.z() + input.camera.cy;
+      }
+      const int x = std::clamp(static_cast<int>(std::lround(u)), 0, input.camera.width - 1);
+      const int y = std::clamp(static_cast<int>(std::lround(v)), 0, input.camera.height - 1);
+      if (input.valid.at<std::uint8_t>(y, x) != 0) continue;
+      state[c] = kOutOfView;
+      out.depth.at<float>(r, c) = nan;
+      out.variance.at<float>(r, c) = nan;
+    }
+  }
+}
+
+/// Averages flow and gate over n x n windows (paper, Section 2.3.1); invalid and gated flow is left out. The
+/// mean of m vectors with independent noise has 1/m of its variance: from the flow's own sigmas, else from
+/// `sigma` where that is not zero.
+void average(const FlowField& flow, const cv::Mat& gate, int n, double sigma, std::vector<float>& sums,
+             FlowField& cells, cv::Mat& cell_gate) {
+  const cv::Size size((flow.vectors.cols + n - 1) / n, (flow.vectors.rows + n - 1) / n);
+  const auto width = static_cast<std::size_t>(flow.vectors.cols);
+  const auto accumulate = PADE_DISPATCH(accumulate_flow_row, simd::best());
+  cells.vectors.create(size, CV_32FC2);
+  cell_gate.create(size, CV_8UC1);
+  cells.sigma.release();
+  if (!flow.sigma.empty() || sigma > 0) cells.sigma.create(size, CV_32FC1);
+  for (int r = 0; r < size.height; ++r) {
+    sums.assign(3 * width, 0.0F);
+    float* const sum_u = sums.data();
+    float* const sum_v = sum_u + width;
+    float* const valid = sum_v + width;
+    const int last = std::min(flow.vectors.rows, (r + 1) * n);
+    for (int v = r * n; v < last; ++v) {
+      accumulate(flow.vectors.ptr<float>(v), gate.ptr<std::uint8_t>(v), width, sum_u, sum_v, valid);
+    }
+    for (int c = 0; c < size.width; ++c) {
+      const auto begin = static_cast<std::size_t>(c * n);
+      const auto end = std::min(width, begin + static_cast<std::size_t>(n));
+      float u = 0;
+      float v = 0;
+      float m = 0;
+      for (std::size_t i = begin; i < end; ++i) {
+        u += sum_u[i];
+        v += sum_v[i];
+        m += valid[i];
+      }
+      cells.vectors.at<cv::Vec2f>(r, c) = {u / m, v / m};  // 0 / 0 is NaN: no flow
+      std::uint8_t reason = 0;
+      if (!(m > 0)) {  // nothing was used: the weakest reason for which any pixel was left out
+        reason = 255;
+        for (int y = r * n; y < last; ++y) {
+          const auto* row = gate.ptr<std::uint8_t>(y);
+          for (std::size_t i = begin; i < end; ++i) reason = std::min(reason, row[i]);
+        }
+      }
+      cell_gate.at<std::uint8_t>(r, c) = reason;
+      if (flow.sigma.empty()) {
+        if (sigma > 0) cells.sigma.at<float>(r, c) = static_cast<float>(sigma) / std::sqrt(m);
+        continue;
+      }
+      float variance = 0;
+      float used = 0;
+      for (int y = r * n; y < last; ++y) {
+        const auto* row = flow.sigma.ptr<float>(y);
+        for (std::size_t i = begin; i < end; ++i) {
+          if (!(gate.at<std::uint8_t>(y, static_cast<int>(i)) == 0) || !std::isfinite(row[i])) continue;
+          variance += row[i] * row[i];
+          used += 1;
+        }
+      }
+      cells.sigma.at<float>(r, c) = std::sqrt(variance) / used;
+    }
+  }
+}
+
+}  // namespace
+
+void DepthEstimator::make_gate(const DepthInput& input) {
+  const cv::Size size = input.flow.vectors.size();
+  diagnostics_.image_noise = 0;
+  const bool judge =
+      options_.texture_gate > 0 && !input.reference.empty() && size.width >= 3 && size.height >= 3;
+  if (judge) {
+    diagnostics_.image_noise = image_noise(input.reference, input.other, input.flow);
+    gate_ = texture_gate(structure_tensor(input.reference), input.camera, input.motion, options_.texture_gate,
+                         diagnostics_.image_noise, size);
+  } else if (gate_.size() != size || cv::countNonZero(gate_) > 0) {
+    gate_ = cv::Mat::zeros(size, CV_8UC1);
+  }
+  if (!input.valid.empty()) gate_.setTo(kOutOfView, input.valid == 0);
+}
+
+std::vector<FlowSample> DepthEstimator::sample(const DepthInput& input) const {
+  const bool cells = options_.window > 1;
+  const cv::Mat& vectors = cells ? averaged_.vectors : input.flow.vectors;
+  const cv::Mat& gate = cells ? cell_gate_ : gate_;
+  const int step = std::max(1, kSampleStep / options_.window);
+  const Derotator derotate(input.camera, input.motion, options_.model, input.derotation);
+  std::vector<FlowSample> samples;
+  samples.reserve(vectors.total() / static_cast<std::size_t>(step * step) + 1);
+  for (int r = step / 2; r < vectors.rows; r += step) {
+    for (int c = step / 2; c < vectors.cols; c += step) {
+      const auto& w = vectors.at<cv::Vec2f>(r, c);
+      if (gate.at<std::uint8_t>(r, c) != 0) continue;
+      const Eigen::Vector2d p(cell_centre(c, options_.window) - input.camera.cx,
+                              cell_centre(r, options_.window) - input.camera.cy);
+      const Eigen::Vector2d d = derotate(p, {w[0], w[1]});
+      if (d.allFinite()) samples.push_back({p, d});
+    }
+  }
+  return samples;
+}
+
+void DepthEstimator::estimate(const DepthInput& input, DepthImage& out) {
+  make_gate(input);
+  const int n = options_.window;
+  if (n > 1) average(input.flow, gate_, n, options_.flow_sigma, sums_, averaged_, cell_gate_);
+  const FlowField& flow = n > 1 ? averaged_ : input.flow;
+  const cv::Mat& gate = n > 1 ? cell_gate_ : gate_;
+
+  // Which translation direction, and how noisy the flow is.
+  Eigen::Vector3d t = input.motion.t_reference_other;
+  double axis_variance = 0;
+  diagnostics_.focus.reset();
+  diagnostics_.flow_sigma = options_.flow_sigma;
+  if (options_.method == Method::ttc) {
+    const double diagonal = std::hypot(input.camera.width, input.camera.height);
+    if (std::abs(t.z()) > kLeastForwardShare * t.norm()) {
+      diagnostics_.focus = focus_of_expansion(sample(input), kFarthestFocus * diagonal);
+    }
+    if (const auto& focus = diagnostics_.focus) {
+      t = t.z() *
+          Eigen::Vector3d(focus->position.x() / input.camera.fx, focus->position.y() / input.camera.fy, 1);
+      axis_variance = 0.5 * focus->covariance.trace() * t.z() * t.z();
+      if (options_.flow_sigma <= 0) diagnostics_.flow_sigma = std::max(kLeastFlowSigma, focus->flow_sigma);
+    } else {
+      t.setZero();  // TTC has no answer
+      if (options_.flow_sigma <= 0) diagnostics_.flow_sigma = kUnknownFlowSigma;
+    }
+  } else if (options_.flow_sigma <= 0) {
+    diagnostics_.flow_sigma = across_sigma(sample(input), input.camera, t);
+  }
+  KernelParameters k = kernel_parameters(input, options_, t, diagnostics_.flow_sigma, axis_variance);
+  if (options_.method == Method::ttc && !diagnostics_.focus) {
+    k.epipole_state = static_cast<std::uint8_t>(DepthState::epipole);
+  }
+
+  out.window = n;
+  out.depth.create(flow.vectors.size(), CV_32FC1);
+  out.variance.create(flow.vectors.size(), CV_32FC1);
+  out.state.create(flow.vectors.size(), CV_8UC1);
+  columns_.resize(static_cast<std::size_t>(flow.vectors.cols));
+  for (int c = 0; c < flow.vectors.cols; ++c) {
+    columns_[static_cast<std::size_t>(c)] = static_cast<float>(cell_centre(c, n) - input.camera.cx);
+  }
+  const auto depth_row = PADE_DISPATCH(depth_row, simd::best());
+  for (int r = 0; r < flow.vectors.rows; ++r) {
+    depth_row(k, columns_.data(), static_cast<float>(cell_centre(r, n) - input.camera.cy),
+              flow.vectors.ptr<float>(r), flow.sigma.empty() ? nullptr : flow.sigma.ptr<float>(r),
+              gate.ptr<std::uint8_t>(r), columns_.size(), out.depth.ptr<float>(r), out.variance.ptr<float>(r),
+              out.state.ptr<std::uint8_t>(r));
+  }
+  if (!input.valid.empty()) hide_invalid_matches(input, k, n, flow, out);
+}
+
+}  // namespace pade::depth

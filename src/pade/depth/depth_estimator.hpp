@@ -1,0 +1,76 @@
+// Depth from motion: the paper's PADE (Section 2.3) in its literal and its exact form, and TTC as compared
+// there.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "pade/core/camera.hpp"
+#include "pade/core/depth_image.hpp"
+#include "pade/core/flow_field.hpp"
+#include "pade/core/pose.hpp"
+#include "pade/depth/depth_options.hpp"
+#include "pade/depth/focus_of_expansion.hpp"
+
+namespace pade::depth {
+
+/// What one pair of frames gives to depth estimation. The images may be empty: then every pixel counts as
+/// textured.
+struct DepthInput {
+  const Camera& camera;                      ///< undistorted pinhole of both frames
+  const RelativeMotion& motion;              ///< the other camera seen from the reference
+  const FlowField& flow;                     ///< from the reference to the other image, of the camera's size
+  Derotation derotation = Derotation::flow;  ///< image: the other image was derotated before matching
+  cv::Mat reference{};                       ///< CV_8UC1, the image on whose pixels the depth lives
+  cv::Mat other{};                           ///< CV_8UC1, the other image as it was matched
+  cv::Mat valid{};  ///< CV_8UC1, 0 where no frame sees anything (lens, airframe); empty = all valid
+};
+
+/// What was found out about the pair as a whole.
+struct DepthDiagnostics {
+  double flow_sigma = 0;                  ///< standard deviation of each flow component that was used, px
+  double image_noise = 0;                 ///< grey levels; 0 where there were no images
+  std::optional<FocusOfExpansion> focus;  ///< TTC only
+};
+
+/// Depth, variance and state per pixel from flow and motion. Keeps its buffers between frames; one per
+/// thread.
+///
+/// With a = -A t and D the derotated flow (paper Eq. 1 with the signs of docs/method.md):
+///   exact         Z = a.a / a.D + t_z      variance (Z - t_z)^4 sigma^2 / |a|^2
+///   instantaneous Z = a.a / a.d
+///   samelson      Z = a.d / d.d (Eq. 2 as the inverse of a 2-vector), plus t_z where exact
+/// plus J Sigma J^T where the motion has a covariance Sigma. TTC is the same with the epipole found in the
+/// flow (focus of expansion e) in place of the pose's: a = t_z (p - e).
+class DepthEstimator {
+ public:
+  explicit DepthEstimator(const DepthOptions& options) : options_(options) {}
+
+  /// @param out  Depth image of input.motion's reference frame; its buffers are reused. `out.time` is left
+  /// alone.
+  void estimate(const DepthInput& input, DepthImage& out);
+  DepthImage estimate(const DepthInput& input) {
+    DepthImage out;
+    estimate(input, out);
+    return out;
+  }
+
+  [[nodiscard]] const DepthOptions& options() const { return options_; }
+  /// Of the last estimate().
+  [[nodiscard]] const DepthDiagnostics& diagnostics() const { return diagnostics_; }
+
+ private:
+  void make_gate(const DepthInput& input);
+  [[nodiscard]] std::vector<FlowSample> sample(const DepthInput& input) const;
+
+  DepthOptions options_;
+  DepthDiagnostics diagnostics_;
+  cv::Mat gate_;        // CV_8UC1 per pixel: 0, or the state that is forced on it
+  FlowField averaged_;  // flow per cell where window > 1
+  cv::Mat cell_gate_;
+  std::vector<float> columns_, sums_;
+};
+
+}  // namespace pade::depth

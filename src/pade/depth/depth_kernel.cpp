@@ -1,0 +1,191 @@
+// PADE per pixel (Eq. 1 and 2 with the errata of docs/method.md). Every branch is a selection, so that the
+// loop vectorises; R - I instead of R keeps the difference D free of cancellation in single precision.
+#include "pade/depth/depth_kernel.hpp"
+
+#ifndef PADE_ISA
+#define PADE_ISA baseline
+#endif
+
+namespace pade::depth::PADE_ISA {
+namespace {
+
+// Values of DepthState; core/depth_image.hpp is too heavy for a kernel (held together by a static_assert
+// there).
+constexpr std::int32_t kMeasured = 0;
+constexpr std::int32_t kLowParallax = 2;
+constexpr std::int32_t kNoTexture = 3;
+constexpr std::int32_t kInconsistent = 4;
+constexpr std::int32_t kOutOfView = 5;
+
+struct Vector2 {
+  float x, y;
+};
+
+/// (I + T) (p / f, 1), projected: what is added to pixel p.
+[[gnu::always_inline]] inline Vector2 turned_shift(const float* t, const KernelParameters& k, float px,
+                                                   float py) {
+  const float rx = px * k.inverse_fx;
+  const float ry = py * k.inverse_fy;
+  const float ex = t[0] * rx + t[1] * ry + t[2];
+  const float ey = t[3] * rx + t[4] * ry + t[5];
+  const float ez = t[6] * rx + t[7] * ry + t[8];
+  const float z = 1.0F + ez;
+  // A direction turned behind the image plane has no pixel: NaN makes every later test fail.
+  const float inverse = z > 0.0F ? 1.0F / z : __builtin_nanf("");
+  return {(k.fx * ex - px * ez) * inverse, (k.fy * ey - py * ez) * inverse};
+}
+
+/// J Sigma J^T of the depth: J = [s a^T(-A)/|a|^2 + (0,0,1), s^2 a^T B(x2) / |a|^2].
+[[gnu::always_inline]] inline float pose_variance(const KernelParameters& k, float x, float y, Vector2 at,
+                                                  float ax, float ay, float inverse_aa, float s, bool has_z) {
+  const float g = s * inverse_aa;
+  const float h = s * g;
+  const float x2 = x + at.x;
+  const float y2 = y + at.y;
+  const float bx = ax * k.fx;
+  const float by = ay * k.fy;
+  const float u = x2 * k.inverse_fx;
+  const float v = y2 * k.inverse_fy;
+  const float j[6] = {-g * bx,
+                      -g * by,
+                      g * (ax * x + ay * y) + (has_z ? 1.0F : 0.0F),
+                      -h * (bx * (-u * v) + by * (-1.0F - v * v)),
+                      -h * (bx * (1.0F + u * u) + by * (u * v)),
+                      -h * (bx * -v + by * u)};
+  float sum = 0;
+  int index = 0;
+#pragma GCC unroll 6
+  for (int r = 0; r < 6; ++r) {
+#pragma GCC unroll 6
+    for (int c = r; c < 6; ++c) sum += (r == c ? 1.0F : 2.0F) * k.pose[index++] * j[r] * j[c];
+  }
+  return sum;
+}
+
+template <KernelDerotation kDerotation, bool kSamelson, bool kSigma, bool kPose>
+void row(const KernelParameters& parameters, const float* __restrict x_of, const float y,
+         const float* __restrict flow, const float* __restrict sigma, const std::uint8_t* __restrict gate,
+         std::size_t count, float* __restrict depth, float* __restrict variance,
+         std::uint8_t* __restrict state) {
+  const KernelParameters k = parameters;  // a copy that no store through the outputs can change
+  const float nan = __builtin_nanf("");
+  for (std::size_t i = 0; i < count; ++i) {
+    const float x = x_of[i];
+    const float wx = flow[2 * i];
+    const float wy = flow[2 * i + 1];
+
+    // a = -A t, and the derotated flow D (or d).
+    const float ax = x * k.tz - k.fx_tx;
+    const float ay = y * k.tz - k.fy_ty;
+    Vector2 d{wx, wy};
+    Vector2 match{x + wx, y + wy};
+    if constexpr (kDerotation == KernelDerotation::none) {
+      const Vector2 shift = turned_shift(k.view, k, match.x, match.y);
+      match = {match.x + shift.x, match.y + shift.y};
+    } else if constexpr (kDerotation == KernelDerotation::exact) {
+      const Vector2 shift = turned_shift(k.turn, k, match.x, match.y);
+      d = {wx + shift.x, wy + shift.y};
+    } else {
+      const float u = x * k.inverse_fx;
+      const float v = y * k.inverse_fy;
+      d.x = wx + k.fx * (-u * v * k.omega[0] + (1.0F + u * u) * k.omega[1] - v * k.omega[2]);
+      d.y = wy + k.fy * (-(1.0F + v * v) * k.omega[0] + u * v * k.omega[1] + u * k.omega[2]);
+    }
+
+    const float aa = ax * ax + ay * ay;
+    const float ad = ax * d.x + ay * d.y;
+    const float across = ax * d.y - ay * d.x;
+    const float s = kSamelson ? ad / (d.x * d.x + d.y * d.y) : aa / ad;
+    const float z = s + k.add_tz;
+    const float sigma2 = kSigma ? sigma[i] * sigma[i] : k.sigma2;
+
+    const float ad2 = ad * ad;
+    const float noise = sigma2 * aa;
+    const bool inside =
+        (match.x >= k.left) & (match.x <= k.right) & (match.y >= k.top) & (match.y <= k.bottom);
+    const bool parallax = ad2 > k.parallax2 * noise;
+    const bool across_ok = (across * across <= k.residual2 * noise) | (across * across <= k.tangent2 * ad2);
+    const bool in_front = (ad > 0.0F) & (z > 0.0F);
+
+    // From the weakest to the strongest reason.
+    std::int32_t why = kMeasured;
+    why = z <= k.range ? why : kLowParallax;
+    why = in_front ? why : kInconsistent;
+    why = parallax ? why : kLowParallax;
+    why = across_ok ? why : kInconsistent;
+    why = inside ? why : kOutOfView;
+    why = (wx == wx) & (wy == wy) ? why : kInconsistent;
+    why = sigma2 < 1e6F ? why : kNoTexture;
+    why = gate[i] == kNoTexture ? kNoTexture : why;
+    why = aa >= k.epipole2 ? why : static_cast<std::int32_t>(k.epipole_state);
+    why = gate[i] == kOutOfView ? kOutOfView : why;
+
+    const float inverse_aa = 1.0F / aa;
+    float spread = s * s * (s * s * sigma2 + k.axis_variance) * inverse_aa;
+    if constexpr (kPose) {
+      spread += pose_variance(k, x, y, d, ax, ay, inverse_aa, s, k.add_tz != 0.0F);
+    }
+    depth[i] = why == kMeasured ? z : nan;
+    variance[i] = why == kMeasured ? spread : nan;
+    state[i] = static_cast<std::uint8_t>(why);
+  }
+}
+
+template <KernelDerotation kDerotation, bool kSamelson, class... Rest>
+void choose(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
+            Rest... rest) {
+  if (sigma != nullptr) {
+    k.has_pose ? row<kDerotation, kSamelson, true, true>(k, x, y, flow, sigma, rest...)
+               : row<kDerotation, kSamelson, true, false>(k, x, y, flow, sigma, rest...);
+  } else {
+    k.has_pose ? row<kDerotation, kSamelson, false, true>(k, x, y, flow, sigma, rest...)
+               : row<kDerotation, kSamelson, false, false>(k, x, y, flow, sigma, rest...);
+  }
+}
+
+template <KernelDerotation kDerotation, class... Rest>
+void choose_reading(const KernelParameters& k, Rest... rest) {
+  k.samelson ? choose<kDerotation, true>(k, rest...) : choose<kDerotation, false>(k, rest...);
+}
+
+}  // namespace
+
+void depth_row(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
+               const std::uint8_t* gate, std::size_t count, float* depth, float* variance,
+               std::uint8_t* state) {
+  switch (k.derotation) {
+    case KernelDerotation::none:
+      return choose_reading<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, depth, variance,
+                                                    state);
+    case KernelDerotation::exact:
+      return choose_reading<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, depth, variance,
+                                                     state);
+    case KernelDerotation::first_order:
+      return choose_reading<KernelDerotation::first_order>(k, x, y, flow, sigma, gate, count, depth, variance,
+                                                           state);
+  }
+}
+
+void accumulate_flow_row(const float* __restrict flow, const std::uint8_t* __restrict gate, std::size_t count,
+                         float* __restrict sum_u, float* __restrict sum_v, float* __restrict valid) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float u = flow[2 * i];
+    const float v = flow[2 * i + 1];
+    const bool use = (u == u) & (v == v) & (gate[i] == 0);
+    sum_u[i] += use ? u : 0.0F;
+    sum_v[i] += use ? v : 0.0F;
+    valid[i] += use ? 1.0F : 0.0F;
+  }
+}
+
+void accumulate_gradients(const std::int16_t* __restrict gx, const std::int16_t* __restrict gy,
+                          std::size_t count, std::int32_t* __restrict xx, std::int32_t* __restrict xy,
+                          std::int32_t* __restrict yy) {
+  for (std::size_t i = 0; i < count; ++i) {
+    xx[i] += gx[i] * gx[i];
+    xy[i] += gx[i] * gy[i];
+    yy[i] += gy[i] * gy[i];
+  }
+}
+
+}  // namespace pade::depth::PADE_ISA

@@ -1,0 +1,123 @@
+// The whole chain as a live vehicle uses it: images with poses in, depth and map out (paper, Figures 1 and
+// 2).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <deque>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "pade/core/camera.hpp"
+#include "pade/core/depth_image.hpp"
+#include "pade/core/flow_field.hpp"
+#include "pade/core/frame.hpp"
+#include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
+#include "pade/depth/depth_estimator.hpp"
+#include "pade/depth/depth_options.hpp"
+#include "pade/flow/flow_estimator.hpp"
+
+namespace pade {
+
+/// On which frame's pixels the depth of a pair lives.
+enum class Order {
+  newest,  ///< flow toward the older frame; depth belongs to the frame that has just come: zero latency
+  first,   ///< the paper's order: depth belongs to the older frame
+};
+
+struct ObstacleMapperOptions {
+  std::string flow = "dis-medium";
+  depth::Derotation derotation = depth::Derotation::image;
+  Order order = Order::newest;
+  int step = 1;
+  bool map = true;
+  depth::DepthOptions depth;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("flow", self.flow, "optical-flow method");
+    field("derotate", self.derotation, "image | flow: where rotation is removed");
+    field("order", self.order, "newest | first: the frame of a pair on whose pixels the depth lives");
+    field("step", self.step, "pairs each frame with the step-th before it");
+    field("map", self.map, "whether depth is fused into the occupancy map");
+    field("depth", self.depth, "depth from motion");
+  }
+};
+
+/// The stages of one frame, in order. `total` is the latency from add() to its return.
+enum class Stage { grey, derotate, flow, depth, map, total };
+inline constexpr std::array<std::string_view, 6> stage_names = {"grey",  "derotate", "flow",
+                                                                "depth", "map",      "total"};
+
+/// What one call of ObstacleMapper::add() did.
+struct MapperUpdate {
+  enum class Outcome {
+    waiting,  ///< the frame was taken, but has no partner yet
+    mapped,   ///< there is a depth image, and the map has it
+    skipped,  ///< the frame was left out: `reason`
+  };
+  Outcome outcome = Outcome::waiting;
+  std::string reason;
+  Frame reference;        ///< the frame of the depth image, grey
+  RelativeMotion motion;  ///< the other camera of the pair seen from the reference
+  FlowField flow;         ///< from the reference to the other image (derotated where derotate = image)
+  DepthImage depth;
+  depth::DepthDiagnostics diagnostics;
+  std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
+};
+
+/// Counts of a flight so far.
+struct MapperHealth {
+  std::size_t frames = 0;  ///< calls of add()
+  std::size_t mapped = 0;
+  std::size_t skipped = 0;
+};
+
+/// Obstacle mapping from one camera and its poses. Not thread-safe; nothing global, no files.
+class ObstacleMapper {
+ public:
+  /// @param camera  Undistorted pinhole (Camera::undistorted(), images through Undistorter). @param valid
+  /// CV_8UC1 of its size, 0 where no frame sees anything (propeller, lens border); empty = all valid.
+  /// Error: an unknown flow method, or an option or camera that makes no sense.
+  static Result<ObstacleMapper> create(const Camera& camera, const ObstacleMapperOptions& options = {},
+                                       const cv::Mat& valid = {});
+
+  /// One frame of the flight. A frame that cannot be used (empty or of another size or type than the
+  /// camera's, a pose that is not finite or not a rotation, not newer than the last) is skipped and counted;
+  /// the flight goes on.
+  /// @param image  CV_8UC1 or CV_8UC3 (BGR), undistorted; copied. @param T_world_camera  pose at `time`.
+  /// @return what was done; valid until the next call.
+  const MapperUpdate& add(const cv::Mat& image, Time time, const Pose& T_world_camera);
+
+  [[nodiscard]] const ObstacleMapperOptions& options() const { return options_; }
+  [[nodiscard]] const Camera& camera() const { return camera_; }
+  [[nodiscard]] const MapperHealth& health() const { return health_; }
+
+ private:
+  ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid,
+                 std::unique_ptr<flow::FlowEstimator> flow);
+  [[nodiscard]] std::string reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const;
+  void map_pair(const Frame& reference, const Frame& other);
+
+  Camera camera_;
+  ObstacleMapperOptions options_;
+  cv::Mat valid_;
+  std::unique_ptr<flow::FlowEstimator> flow_;
+  depth::DepthEstimator depth_;
+  std::deque<Frame> recent_;  // the last step frames, grey, oldest first
+  MapperUpdate update_;
+  MapperHealth health_;
+};
+
+}  // namespace pade
+
+template <>
+struct pade::EnumNames<pade::Order> {
+  static constexpr std::array names = {std::pair{Order::newest, std::string_view("newest")},
+                                       std::pair{Order::first, std::string_view("first")}};
+};
