@@ -15,7 +15,9 @@ constexpr double kMedianToSigma = 1.4826;
 constexpr double kLeastFlowSigma = 0.01;   // px; no flow method is better, and thresholds need a scale
 constexpr double kUnknownFlowSigma = 0.5;  // px, where too few pixels are left to measure it
 constexpr std::size_t kFewestSamples = 50;
-constexpr int kSampleStep = 4;        // px between the pixels that measure flow noise and focus of expansion
+constexpr int kSampleStep = 4;  // px between the pixels that measure flow noise and focus of expansion
+constexpr double kEpipoleCone =
+    0.25;                             // tangent of the angle from the epipole beyond which it is not to blame
 constexpr double kFarthestFocus = 3;  // image diagonals from the centre; beyond, the flow is parallel
 constexpr double kLeastForwardShare = 0.05;  // of the translation; less is not forward motion
 
@@ -69,12 +71,11 @@ KernelParameters kernel_parameters(const DepthInput& input, const DepthOptions& 
   k.parallax2 = static_cast<float>(options.parallax_gate * options.parallax_gate);
   k.residual2 = static_cast<float>(options.residual_gate * options.residual_gate);
   k.tangent2 = static_cast<float>(std::pow(std::tan(options.residual_angle), 2));
-  const double gate = options.parallax_gate * sigma;
-  const double least = gate * std::max(options.nearest - t.z(), 0.1 * options.nearest);
-  k.epipole2 = static_cast<float>(least * least);
-  // Where even the best-placed pixel has no parallax the camera hardly moved; no pixel is special then.
-  const bool moved = std::max(camera.fx, camera.fy) * t.norm() >= least;
-  k.epipole_state = static_cast<std::uint8_t>(moved ? DepthState::epipole : DepthState::low_parallax);
+  // |a| at which a thing at depth Z has just enough parallax.
+  const auto needed = [&](double Z) { return options.parallax_gate * sigma * std::max(Z - t.z(), 0.1 * Z); };
+  const double cone = kEpipoleCone * std::max(camera.fx, camera.fy) * t.norm();
+  k.blind2 = static_cast<float>(std::pow(needed(options.nearest), 2));
+  k.epipole2 = static_cast<float>(std::pow(std::min(needed(options.far), cone), 2));
   k.range = static_cast<float>(options.range);
   k.axis_variance = static_cast<float>(axis_variance);
   k.left = static_cast<float>(-camera.cx);
@@ -251,7 +252,7 @@ void DepthEstimator::estimate(const DepthInput& input, DepthImage& out) {
   }
   KernelParameters k = kernel_parameters(input, options_, t, diagnostics_.flow_sigma, axis_variance);
   if (options_.method == Method::ttc && !diagnostics_.focus) {
-    k.epipole_state = static_cast<std::uint8_t>(DepthState::epipole);
+    k.epipole2 = std::numeric_limits<float>::infinity();  // wherever the focus may be, nothing is known
   }
 
   out.window = n;

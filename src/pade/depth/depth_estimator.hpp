@@ -39,11 +39,12 @@ struct DepthDiagnostics {
 /// thread.
 ///
 /// With a = -A t and D the derotated flow (paper Eq. 1 with the signs of docs/method.md):
-///   exact         Z = a.a / a.D + t_z      variance (Z - t_z)^4 sigma^2 / |a|^2
+///   exact         Z = a.a / a.D + t_z      variance (Z - t_z)^4 sigma^2 / |a|^2 (1 + 18 e^2 + 400 e^4)
 ///   instantaneous Z = a.a / a.d
 ///   samelson      Z = a.d / d.d (Eq. 2 as the inverse of a 2-vector), plus t_z where exact
-/// plus J Sigma J^T where the motion has a covariance Sigma. TTC is the same with the epipole found in the
-/// flow (focus of expansion e) in place of the pose's: a = t_z (p - e).
+/// (with e = sigma / |D|: the mean squared error of 1/(1/Z) for a log-uniform prior on depth, which is 1 for
+/// clear parallax) plus J Sigma J^T where the motion has a covariance Sigma. TTC is the same with the epipole
+/// found in the flow (focus of expansion e) in place of the pose's: a = t_z (p - e).
 class DepthEstimator {
  public:
   explicit DepthEstimator(const DepthOptions& options) : options_(options) {}

@@ -12,6 +12,7 @@ namespace {
 // Values of DepthState; core/depth_image.hpp is too heavy for a kernel (held together by a static_assert
 // there).
 constexpr std::int32_t kMeasured = 0;
+constexpr std::int32_t kEpipole = 1;
 constexpr std::int32_t kLowParallax = 2;
 constexpr std::int32_t kNoTexture = 3;
 constexpr std::int32_t kInconsistent = 4;
@@ -107,21 +108,27 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
     const bool across_ok = (across * across <= k.residual2 * noise) | (across * across <= k.tangent2 * ad2);
     const bool in_front = (ad > 0.0F) & (z > 0.0F);
 
+    const std::int32_t low = aa < k.epipole2 ? kEpipole : kLowParallax;
+
     // From the weakest to the strongest reason.
     std::int32_t why = kMeasured;
     why = z <= k.range ? why : kLowParallax;
     why = in_front ? why : kInconsistent;
-    why = parallax ? why : kLowParallax;
+    why = parallax ? why : low;
     why = across_ok ? why : kInconsistent;
     why = inside ? why : kOutOfView;
     why = (wx == wx) & (wy == wy) ? why : kInconsistent;
     why = sigma2 < 1e6F ? why : kNoTexture;
     why = gate[i] == kNoTexture ? kNoTexture : why;
-    why = aa >= k.epipole2 ? why : static_cast<std::int32_t>(k.epipole_state);
+    why = aa >= k.blind2 ? why : low;
     why = gate[i] == kOutOfView ? kOutOfView : why;
 
     const float inverse_aa = 1.0F / aa;
-    float spread = s * s * (s * s * sigma2 + k.axis_variance) * inverse_aa;
+    // 1/Z has a symmetric error, Z has not: mean squared error under a log-uniform prior on depth, with
+    // e2 = (sigma / parallax)^2 (docs/method.md; held to the integral by a test).
+    const float e2 = noise / ad2;
+    const float second_order = 1.0F + e2 * (18.0F + 400.0F * e2);
+    float spread = s * s * (s * s * sigma2 * second_order + k.axis_variance) * inverse_aa;
     if constexpr (kPose) {
       spread += pose_variance(k, x, y, d, ax, ay, inverse_aa, s, k.add_tz != 0.0F);
     }

@@ -28,13 +28,13 @@ struct KernelParameters {
   float parallax2;         ///< parallax_gate^2
   float residual2;         ///< residual_gate^2
   float tangent2;          ///< tan(residual_angle)^2
-  float epipole2;          ///< |a|^2 below this is the epipole
+  float blind2;            ///< |a|^2 below this: nothing, however near, has parallax
+  float epipole2;          ///< |a|^2 below this: no parallax because of the epipole, not because of distance
   float range;             ///< m
   float axis_variance;     ///< variance added to |a| (uncertain focus of expansion), same unit as |a|^2
   float left, right, top,
       bottom;      ///< where a match counts as inside the other image, relative to the principal point
   float pose[21];  ///< upper triangle, row by row, of the covariance of (t, theta)
-  std::uint8_t epipole_state;
   KernelDerotation derotation;
   bool samelson;
   bool has_pose;

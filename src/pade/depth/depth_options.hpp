@@ -38,6 +38,7 @@ struct DepthOptions {
   double range = 20;
   double flow_sigma = 0;
   double nearest = 1;
+  double far = 10;
   double parallax_gate = 3;
   double residual_gate = 5;
   double residual_angle = 0.25;
