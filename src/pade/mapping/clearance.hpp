@@ -1,0 +1,70 @@
+// How far each pixel shows space to be free, with a pyramid over it: tells for a cube of space whether all of
+// it, part of it or nothing of it is free.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "pade/core/camera.hpp"
+#include "pade/core/depth_image.hpp"
+#include "pade/core/pose.hpp"
+
+namespace pade::mapping {
+
+/// What a depth image says about a cube.
+enum class View {
+  nothing,  ///< no voxel in it is shown free
+  partly,   ///< look at its parts
+  free,     ///< every point of it lies before what the pixels that look at it have measured
+};
+
+/// The free part of the viewing rays of one depth image, Z - k sigma, at most the range.
+class Clearance {
+ public:
+  struct Parameters {
+    double range = 20;          ///< m along the optical axis
+    double margin_sigmas = 2;   ///< k
+    double known_share = 0.75;  ///< of the pixels that see a voxel, how many must have measured
+  };
+
+  /// `image` as OccupancyMap::integrate() takes it.
+  Clearance(const DepthImage& image, const Camera& camera, const Pose& T_world_camera,
+            const Parameters& parameters);
+
+  /// @param centre  of an axis-aligned cube, world, metres
+  /// @param side    metres
+  /// @param is_voxel  a voxel is not divided further: the answer is `free` or `nothing`
+  [[nodiscard]] View look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const;
+
+ private:
+  struct Cell {
+    float nearest;       // of the known pixels, m; infinity where none is known
+    float farthest;      // 0 where none is known
+    std::int32_t known;  // pixels
+  };
+  struct Level {
+    int width = 0;
+    int height = 0;
+    std::vector<Cell> cells;
+  };
+  struct Seen {
+    float nearest;
+    float farthest;
+    double share;  // of known pixels
+  };
+  void build_pyramid(const std::vector<float>& free_end, int width, int height);
+  [[nodiscard]] Seen over(int u0, int v0, int u1, int v1) const;
+
+  Camera camera_;  // of the cells
+  Parameters parameters_;
+  Eigen::Matrix3d R_camera_world_;
+  Eigen::Vector3d reach_;                     // half extents of a cube of side 1 along the axes of the camera
+  Eigen::Vector3d origin_;                    // of the camera, world
+  Eigen::Matrix<double, 4, 3> side_normals_;  // of the viewing frustum, inward, world
+  Eigen::Vector4d side_reach_;                // support of a cube of side 1 along them
+  std::vector<Level> levels_;
+};
+
+}  // namespace pade::mapping

@@ -1,0 +1,78 @@
+// The pieces of one update of the map: a set of hit voxels, the free cubes, and both applied to an octree in
+// one pass.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+#include <octomap/OcTree.h>
+
+#include "pade/mapping/clearance.hpp"
+#include "pade/mapping/occupancy_map.hpp"
+
+namespace pade::mapping {
+
+inline constexpr unsigned kTreeDepth = 16;
+inline constexpr int kTreeCentre = 32768;  // key of the voxel just above the origin
+
+/// Keys interleaved bit by bit, x lowest: sorting by it walks the octree depth first.
+std::uint64_t morton_code(const octomap::OcTreeKey& key);
+octomap::OcTreeKey morton_key(std::uint64_t code);
+
+/// An update of one cube.
+struct CellUpdate {
+  std::uint64_t code = 0;  ///< Morton code of its lower corner
+  unsigned depth = kTreeDepth;
+  bool hit = false;  ///< else a miss
+};
+
+/// Counts how often each voxel was hit. Open addressing; cleared at a cost proportional to what was used.
+class HitCounter {
+ public:
+  struct Hit {
+    octomap::OcTreeKey key;
+    std::uint32_t count = 0;
+  };
+  void add(const octomap::OcTreeKey& key);
+  void clear();
+  /// How often a voxel was hit.
+  [[nodiscard]] std::uint32_t count(const octomap::OcTreeKey& key) const;
+  /// In no particular order.
+  [[nodiscard]] std::span<const Hit> hits() const { return hits_; }
+
+ private:
+  [[nodiscard]] std::size_t slot_of(const octomap::OcTreeKey& key) const;
+  void grow();
+  std::vector<std::uint32_t> slots_;  // index into hits_ plus one; 0 = empty
+  std::vector<Hit> hits_;
+  std::size_t last_ = 0;  // neighbouring pixels mostly hit the same voxel
+};
+
+/// Appends the free cubes that `clearance` shows, largest first possible, in Morton order.
+/// @param eye    camera position, world
+/// @param reach  no cube farther than this from the eye, m
+void find_free_cells(const Clearance& clearance, const Eigen::Vector3d& eye, double reach, double voxel,
+                     std::vector<CellUpdate>& out);
+
+/// An octree to which many updates are applied in one pass: each inner node on the way is visited once.
+class UpdatableTree : public octomap::OcTree {
+ public:
+  using octomap::OcTree::OcTree;
+  /// @param updates  in Morton order, disjoint
+  /// @param change   what became occupied or free is appended
+  void apply(std::span<const CellUpdate> updates, MapChange& change);
+
+ private:
+  void apply_below(octomap::OcTreeNode* node, bool created, unsigned depth,
+                   std::span<const CellUpdate> updates, MapChange& change);
+  void apply_to_all(octomap::OcTreeNode* node, bool created, unsigned depth, const CellUpdate& update,
+                    MapChange& change);
+  void settle(octomap::OcTreeNode* node);
+};
+
+/// The cell of a cube with this Morton code.
+MapCell cell_of(std::uint64_t code, unsigned depth, double voxel);
+
+}  // namespace pade::mapping
