@@ -1,0 +1,50 @@
+# What `cmake --install` and `cpack` put where: the program (component "pade") and the library with its headers
+# (component "libpade-dev").
+include(CMakePackageConfigHelpers)
+
+set(pade_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pade)
+
+install(TARGETS pade EXPORT padeTargets COMPONENT libpade-dev)
+install(EXPORT padeTargets NAMESPACE pade:: DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/pade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libpade-dev
+        FILES_MATCHING PATTERN "*.hpp")
+install(FILES ${PROJECT_BINARY_DIR}/generated/pade/core/version.hpp
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pade/core COMPONENT libpade-dev)
+
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/padeConfig.cmake.in ${PROJECT_BINARY_DIR}/padeConfig.cmake
+                              INSTALL_DESTINATION ${pade_cmake_folder})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/padeConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/padeConfig.cmake ${PROJECT_BINARY_DIR}/padeConfigVersion.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/PadeDependencies.cmake ${PROJECT_SOURCE_DIR}/cmake/FindPadeOpenCV.cmake
+        DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
+
+install(TARGETS pade_cli RUNTIME COMPONENT pade)
+foreach(component pade libpade-dev)
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${component} RENAME copyright
+          COMPONENT ${component})
+endforeach()
+
+# Two Debian packages: cpack -G DEB
+set(CPACK_PACKAGE_NAME pade)
+set(CPACK_PACKAGE_CONTACT "The PADE authors <pade@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
+set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
+set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL pade libpade-dev)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "")
+set(CPACK_DEBIAN_PADE_PACKAGE_NAME pade)
+set(CPACK_DEBIAN_PADE_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PADE_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_NAME libpade-dev)
+set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_DEPENDS
+    "libeigen3-dev (>= 3.4), libopencv-core-dev (>= 4.6), libopencv-imgproc-dev, libopencv-imgcodecs-dev, \
+libopencv-video-dev, liboctomap-dev (>= 1.9), libgeographiclib-dev (>= 2.1), libyaml-cpp-dev (>= 0.7), \
+nlohmann-json3-dev (>= 3.11), libfmt-dev (>= 9), libspdlog-dev (>= 1:1.10)")
+set(CPACK_COMPONENT_PADE_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: the program.")
+set(CPACK_COMPONENT_LIBPADE-DEV_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: library, headers and CMake files.")
+include(CPack)
