@@ -117,7 +117,7 @@ std::optional<Eigen::Vector3d> read_world_up(Fields& fields) {
   const Yaml* node = fields.find({"world_up"});
   if (node == nullptr) return std::nullopt;
   if (node->kind == Yaml::Kind::scalar) {
-    const auto axis = parse_axis(node->scalar);
+    const auto axis = parse_direction(node->scalar);
     if (!axis) fields.wrong(*node, "world_up", kExpected);
     return axis;
   }
@@ -284,20 +284,6 @@ std::string without_opencv_directive(std::string_view text) {
 }
 
 }  // namespace
-
-std::optional<Eigen::Vector3d> parse_axis(std::string_view text) {
-  double sign = 1;
-  if (text.starts_with('+') || text.starts_with('-')) {
-    sign = text.front() == '-' ? -1 : 1;
-    text.remove_prefix(1);
-  }
-  if (text.size() != 1) return std::nullopt;
-  const char axis = text.front();
-  if (axis == 'x' || axis == 'X') return sign * Eigen::Vector3d::UnitX();
-  if (axis == 'y' || axis == 'Y') return sign * Eigen::Vector3d::UnitY();
-  if (axis == 'z' || axis == 'Z') return sign * Eigen::Vector3d::UnitZ();
-  return std::nullopt;
-}
 
 Result<Calibration> parse_calibration(std::string_view text, const std::string& file) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);

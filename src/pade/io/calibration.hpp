@@ -16,6 +16,7 @@
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
+#include "pade/io/world.hpp"
 
 namespace pade {
 namespace io {
@@ -24,15 +25,6 @@ namespace io {
 enum class PoseConvention {
   camera_to_world_optical,  ///< T_world_camera, camera x right, y down, z forward
   body_to_world,            ///< T_world_body; T_body_camera is applied
-};
-
-/// WGS-84 position of the origin of the pose world.
-struct GeographicOrigin {
-  double latitude_deg = 0;
-  double longitude_deg = 0;
-  double height = 0;  ///< above the ellipsoid, metres
-
-  bool operator==(const GeographicOrigin&) const = default;
 };
 
 /// The content of a calibration file. Empty = the file does not say.
@@ -56,9 +48,6 @@ struct Calibration {
 Result<Calibration> read_calibration(const std::filesystem::path& file);
 /// The same from text; `file` is the name in messages.
 Result<Calibration> parse_calibration(std::string_view text, const std::string& file);
-
-/// "+x", "-y", "z" ... as a unit vector; empty where the text is no axis.
-std::optional<Eigen::Vector3d> parse_axis(std::string_view text);
 
 }  // namespace io
 

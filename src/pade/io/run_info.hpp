@@ -13,9 +13,8 @@
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
 #include "pade/core/result.hpp"
-#include "pade/io/calibration.hpp"
-#include "pade/io/sequence.hpp"
 #include "pade/io/skipped.hpp"
+#include "pade/io/world.hpp"
 
 namespace pade::io {
 

@@ -148,7 +148,9 @@ std::optional<WorldUp> mean_camera_up(const std::vector<FrameEntry>& frames) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const FrameEntry& frame : frames) sum -= frame.T_world_camera.matrix3().col(1);  // camera y is down
   if (sum.norm() < 0.1 * static_cast<double>(frames.size())) return std::nullopt;
-  return WorldUp{sum.normalized(), false};
+  Eigen::Index axis = 0;
+  sum.cwiseAbs().maxCoeff(&axis);
+  return WorldUp{std::copysign(1.0, sum[axis]) * Eigen::Vector3d::Unit(axis), false, "mean camera-down axis"};
 }
 
 /// `# frame=ENU origin=lat,lon,h` in the head of gnss.csv.
@@ -202,9 +204,9 @@ void make_relative(ReadReport& report, const fs::path& folder) {
 }
 
 Status check_options(const SequenceOptions& options) {
-  if (!options.world_up.empty() && !parse_axis(options.world_up)) {
-    return Error{
-        fmt::format("world_up: found {}, expected +x, -x, +y, -y, +z or -z", in_quotes(options.world_up))};
+  if (!options.world_up.empty() && !parse_direction(options.world_up)) {
+    return Error{fmt::format("world_up: found {}, expected +x, -x, +y, -y, +z, -z or three numbers",
+                             in_quotes(options.world_up))};
   }
   if (!(options.largest_pose_gap >= 0)) return Error{"largest_pose_gap: expected a number of seconds >= 0"};
   if (!(options.largest_truth_gap >= 0)) return Error{"largest_truth_gap: expected a number of seconds >= 0"};
@@ -300,9 +302,11 @@ void Sequence::Data::choose_truth() {
 
 void Sequence::Data::choose_world() {
   if (!options.world_up.empty()) {
-    up = WorldUp{*parse_axis(options.world_up), true};
+    up = WorldUp{*parse_direction(options.world_up), true, "command line"};
   } else if (listing.calibration.world_up) {
-    up = WorldUp{*listing.calibration.world_up, true};
+    up = WorldUp{*listing.calibration.world_up, true, "camera.yaml"};
+  } else if (listing.world_up) {
+    up = listing.world_up;
   } else {
     up = mean_camera_up(frames);
   }

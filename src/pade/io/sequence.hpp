@@ -19,6 +19,7 @@
 #include "pade/io/intensity.hpp"
 #include "pade/io/skipped.hpp"
 #include "pade/io/trajectory.hpp"
+#include "pade/io/world.hpp"
 
 namespace pade::io {
 
@@ -35,7 +36,8 @@ struct SequenceOptions {
   static void visit(Self& self, Visitor&& field) {
     field("poses", self.poses, "groundtruth, original (groundtruth_original.txt) or a pose file");
     field("calibration", self.calibration, "calibration file to use instead of the sequence's own");
-    field("world_up", self.world_up, "axis of the pose world that points up: +x, -x, +y, -y, +z or -z");
+    field("world_up", self.world_up,
+          "direction of the pose world that points up: +x, -x, +y, -y, +z, -z or \"x y z\"");
     field("largest_pose_gap", self.largest_pose_gap,
           "poses are interpolated between rows at most this far apart, s");
     field("largest_truth_gap", self.largest_truth_gap,
@@ -43,12 +45,6 @@ struct SequenceOptions {
     field("mask_growth", self.mask_growth, "pixels that see nothing are grown by this radius, pixels");
     field("strict", self.strict, "refuse what would otherwise be skipped");
   }
-};
-
-/// The axis of the pose world that points up.
-struct WorldUp {
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector
-  bool stated = false;  ///< by the options, camera.yaml or the layout; else the mean of the cameras' up axes
 };
 
 /// Frames with poses, calibrated camera, mask and (where recorded) true depth. Immutable once open: every
@@ -99,7 +95,8 @@ class Sequence {
   [[nodiscard]] const std::filesystem::path& pose_file() const;
   [[nodiscard]] const SequenceOptions& options() const;
   [[nodiscard]] const IntensityScaling& intensity() const;
-  /// Empty where nothing is stated and the cameras' up axes have no common direction.
+  /// Where nothing is stated, the axis nearest to the mean of the cameras' up axes; empty where they have no
+  /// common direction.
   [[nodiscard]] const std::optional<WorldUp>& world_up() const;
   [[nodiscard]] const std::optional<GeographicOrigin>& origin() const;
   /// T_body_camera, time offset, GNSS lever arm and the like, as far as stated.

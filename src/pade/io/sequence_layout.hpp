@@ -28,6 +28,7 @@ struct SequenceListing {
   Trajectory trajectory;       ///< T_world_camera or T_world_body
   bool poses_of_body = false;  ///< T_body_camera of `calibration` is to be applied
   Calibration calibration;
+  std::optional<WorldUp> world_up;  ///< where the layout itself prescribes it
 };
 
 /// What a layout needs to know of the options.
