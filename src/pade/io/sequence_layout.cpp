@@ -53,24 +53,23 @@ std::vector<fs::path> image_files(const fs::path& folder) {
   return files;
 }
 
-Result<Calibration> layout_calibration(const fs::path& folder, const fs::path& own,
-                                       const LayoutChoice& choice, ReadReport& report) {
+Result<Calibration> with_overrides(Calibration base, const fs::path& folder, const LayoutChoice& choice,
+                                   ReadReport& report) {
+  for (const std::string& field : base.unknown_fields) {
+    report.notes.push_back(fmt::format("the calibration field {} is unknown and was ignored", field));
+  }
   std::vector<fs::path> files;
-  if (!own.empty() && (path_exists(own) || choice.calibration_file.empty())) files.push_back(own);
-  const fs::path ours = folder / "camera.yaml";
-  if (own != ours && path_exists(ours)) files.push_back(ours);
+  if (path_exists(folder / "camera.yaml")) files.push_back(folder / "camera.yaml");
   if (!choice.calibration_file.empty()) files.push_back(choice.calibration_file);
-
-  Calibration merged;
   for (const fs::path& file : files) {
     const auto read = read_calibration(file);
     if (!read) return read.error();
-    override_with(merged, *read);
+    override_with(base, *read);
     for (const std::string& field : read->unknown_fields) {
       report.notes.push_back(fmt::format("{}: field {} is unknown and was ignored", file.string(), field));
     }
   }
-  return merged;
+  return base;
 }
 
 Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& choice, ReadReport& report) {
@@ -78,6 +77,12 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) {
     return Error{fmt::format("{}: is a file, expected the folder of a sequence", folder.string())};
+  }
+  if (path_exists(folder / "mav0" / "cam0") || path_exists(folder / "cam0" / "data.csv")) {
+    return read_euroc_layout(folder, choice, report);
+  }
+  for (const char* name : {"image_0", "image_1", "image_2", "image_3"}) {
+    if (path_exists(folder / name)) return read_kitti_layout(folder, choice, report);
   }
   for (const char* name : {"rgb", "rgb.txt", "associations.txt"}) {
     if (path_exists(folder / name)) return read_tum_layout(folder, choice, report);

@@ -51,9 +51,22 @@ Result<SequenceListing> read_layout(const std::filesystem::path& folder, const L
 /// Image files directly inside `folder`, sorted by name; empty where there is no such folder.
 std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder);
 
-/// The layout's own calibration with what the options and an optional camera.yaml in `folder` say instead.
-/// `own` is the layout's calibration file, or empty where it has none in this form.
-Result<Calibration> layout_calibration(const std::filesystem::path& folder, const std::filesystem::path& own,
-                                       const LayoutChoice& choice, ReadReport& report);
+/// `base`, the layout's own calibration, with what camera.yaml in `folder` and then the calibration file of
+/// the options say instead.
+Result<Calibration> with_overrides(Calibration base, const std::filesystem::path& folder,
+                                   const LayoutChoice& choice, ReadReport& report);
+
+/// The parsers behind the layouts. Rows that cannot be used go to `report`; `file` is the name in messages.
+/// Lines of a time and a file name relative to the list, in columns `column` and `column` + 1.
+std::vector<StampedFile> parse_image_list(std::string_view text, const std::filesystem::path& file,
+                                          std::size_t column, ReadReport& report);
+std::vector<StampedFile> parse_euroc_images(std::string_view text, const std::filesystem::path& file,
+                                            ReadReport& report);
+Result<Trajectory> parse_euroc_poses(std::string_view text, const std::string& file, ReadReport& report);
+/// Row i is the pose at times[i].
+Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& file,
+                                     const std::vector<std::optional<Time>>& times, ReadReport& report);
+/// Row P<camera> of calib.txt; the body is camera 0, and the image size is not stated.
+Result<Calibration> parse_kitti_calibration(std::string_view text, const std::string& file, int camera);
 
 }  // namespace pade::io

@@ -13,24 +13,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Lists `time file` in columns `column` and `column` + 1.
-Result<std::vector<StampedFile>> read_list(const fs::path& folder, const char* name, std::size_t column,
-                                           ReadReport& report) {
-  const auto text = read_text(folder / name);
+Result<std::vector<StampedFile>> read_image_list(const fs::path& file, std::size_t column,
+                                                 ReadReport& report) {
+  const auto text = read_text(file);
   if (!text) return text.error();
-  std::vector<StampedFile> files;
-  for (const Line& line : data_lines(*text)) {
-    const auto fields = split_fields(line.text);
-    const auto time = column < fields.size() ? parse_time(fields[column]) : std::nullopt;
-    if (!time || column + 1 >= fields.size() || fields[column + 1].empty()) {
-      report.skip((folder / name).string(),
-                  fmt::format("line {}: found {}, expected a time in seconds and a file name", line.number,
-                              in_quotes(line.text)));
-      continue;
-    }
-    files.push_back({*time, folder / fields[column + 1]});
-  }
-  return files;
+  return parse_image_list(*text, file, column, report);
 }
 
 /// Image files whose names are their times.
@@ -50,8 +37,9 @@ std::vector<StampedFile> files_named_by_time(const fs::path& folder, ReadReport&
 Result<std::vector<StampedFile>> list_images(const fs::path& folder, const char* kind, std::size_t column,
                                              ReadReport& report) {
   const std::string list = fmt::format("{}.txt", kind);
-  if (path_exists(folder / list)) return read_list(folder, list.c_str(), 0, report);
-  if (path_exists(folder / "associations.txt")) return read_list(folder, "associations.txt", column, report);
+  if (path_exists(folder / list)) return read_image_list(folder / list, 0, report);
+  if (path_exists(folder / "associations.txt"))
+    return read_image_list(folder / "associations.txt", column, report);
   return files_named_by_time(folder / kind, report);
 }
 
@@ -63,11 +51,31 @@ fs::path pose_file(const fs::path& folder, const std::string& poses) {
 
 }  // namespace
 
+std::vector<StampedFile> parse_image_list(std::string_view text, const fs::path& file, std::size_t column,
+                                          ReadReport& report) {
+  std::vector<StampedFile> images;
+  for (const Line& line : data_lines(text)) {
+    const auto fields = split_fields(line.text);
+    const auto time = column < fields.size() ? parse_time(fields[column]) : std::nullopt;
+    if (!time || column + 1 >= fields.size() || fields[column + 1].empty()) {
+      report.skip(file.string(), fmt::format("line {}: found {}, expected a time in seconds and a file name",
+                                             line.number, in_quotes(line.text)));
+      continue;
+    }
+    images.push_back({*time, file.parent_path() / fields[column + 1]});
+  }
+  return images;
+}
+
 Result<SequenceListing> read_tum_layout(const fs::path& folder, const LayoutChoice& choice,
                                         ReadReport& report) {
   SequenceListing listing;
   listing.layout = "TUM RGB-D";
-  auto calibration = layout_calibration(folder, folder / "camera.yaml", choice, report);
+  if (choice.calibration_file.empty() && !path_exists(folder / "camera.yaml")) {
+    return Error{fmt::format("{}: no such file, expected the calibration of the camera",
+                             (folder / "camera.yaml").string())};
+  }
+  auto calibration = with_overrides({}, folder, choice, report);
   if (!calibration) return calibration.error();
   listing.calibration = std::move(*calibration);
 
