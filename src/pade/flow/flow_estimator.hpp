@@ -13,6 +13,12 @@
 
 namespace pade::flow {
 
+/// Which of the two newest images of a stream carries the pixel grid of the flow.
+enum class FlowReference {
+  previous,  ///< previous(p) = newest(p + w)
+  newest,    ///< newest(p) = previous(p + w): no latency
+};
+
 /// Dense optical flow between two images of one size. An object keeps buffers between calls: use one per
 /// thread.
 class FlowEstimator {
@@ -23,18 +29,34 @@ class FlowEstimator {
   virtual ~FlowEstimator() = default;
 
   /// Flow w with first(p) = second(p + w).
-  /// @param first, second  CV_8UC1, one size, any stride.
-  /// @param initial        CV_32FC2 of that size, pixels: where to start the search; empty = zero. Methods
-  /// that
-  ///                       cannot use it ignore it.
+  /// @param first, second  CV_8UC1, one size, any stride. Our own methods take CV_16UC1 as well.
+  /// @param initial        CV_32FC2 of that size, pixels: where to start the search; empty = zero. NaN counts
+  /// as
+  ///                       zero. Methods that cannot use it ignore it.
   /// @return vectors of the images' size; NaN where the method knows that it failed; sigma where it has one.
+  /// Our
+  ///         own methods return an empty field where the images are empty, of another type, or differ in
+  ///         size.
   virtual FlowField estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) = 0;
   FlowField estimate(const cv::Mat& first, const cv::Mat& second) {
     return estimate(first, second, cv::Mat());
   }
 
+  /// Flow between the image of the previous call and this one. Our own methods keep what they computed from
+  /// the previous image, so that a stream costs less than pairs.
+  /// @return an empty field for the first image, and where the size differs from that of the previous image.
+  virtual FlowField next(const cv::Mat& image, FlowReference reference, const cv::Mat& initial);
+  FlowField next(const cv::Mat& image, FlowReference reference = FlowReference::previous) {
+    return next(image, reference, cv::Mat());
+  }
+  /// Forgets the previous image of a stream.
+  virtual void restart();
+
   /// The name that make_flow_estimator() knows.
   [[nodiscard]] virtual std::string_view name() const = 0;
+
+ private:
+  cv::Mat previous_;
 };
 
 /// All names in the order of help texts, without aliases.

@@ -1,0 +1,163 @@
+// One SIMD vector of floats per instruction set, for kernel files only (compiled once per set, see
+// cmake/PadeCompiler.cmake). Arithmetic is the compilers' vector extension, element-wise and never fused, so
+// that every set gives the same bits; what the extension cannot say is here.
+#pragma once
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#endif
+
+#include "pade/flow/kernels/plane_view.hpp"
+
+#define PADE_INLINE [[gnu::always_inline]] static inline
+
+namespace pade::flow::PADE_ISA {
+
+#if defined(__AVX512F__)
+inline constexpr int kLanes = 16;
+#elif defined(__AVX2__)
+inline constexpr int kLanes = 8;
+#else
+inline constexpr int kLanes = 4;
+#endif
+
+using V [[gnu::vector_size(4 * kLanes)]] = float;
+using I [[gnu::vector_size(4 * kLanes)]] = int;
+
+static_assert(kRowMultiple % (2 * kLanes) == 0);
+
+PADE_INLINE V load(const float* from) {
+  V value;
+  __builtin_memcpy(&value, from, sizeof value);
+  return value;
+}
+PADE_INLINE void store(float* to, V value) { __builtin_memcpy(to, &value, sizeof value); }
+PADE_INLINE V set(float value) { return value - V{}; }
+PADE_INLINE I set(int value) { return value - I{}; }
+
+// 0, 1, 2, ... as floats.
+PADE_INLINE V ramp() {
+#if defined(__AVX512F__)
+  return V{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+#elif defined(__AVX2__)
+  return V{0, 1, 2, 3, 4, 5, 6, 7};
+#else
+  return V{0, 1, 2, 3};
+#endif
+}
+
+// min and max return the second operand where either is NaN, on every machine.
+#if defined(__AVX512F__)
+// The plain intrinsics of GCC 12 pass an uninitialised operand, which its own warnings refuse.
+inline constexpr __mmask16 kAll = 0xffff;
+PADE_INLINE V min(V a, V b) { return V(_mm512_maskz_min_ps(kAll, __m512(a), __m512(b))); }
+PADE_INLINE V max(V a, V b) { return V(_mm512_maskz_max_ps(kAll, __m512(a), __m512(b))); }
+PADE_INLINE V sqrt(V a) { return V(_mm512_maskz_sqrt_ps(kAll, __m512(a))); }
+PADE_INLINE V gather(const float* base, I index) {
+  return V(_mm512_mask_i32gather_ps(__m512{}, kAll, __m512i(index), base, 4));
+}
+#elif defined(__AVX2__)
+PADE_INLINE V min(V a, V b) { return V(_mm256_min_ps(__m256(a), __m256(b))); }
+PADE_INLINE V max(V a, V b) { return V(_mm256_max_ps(__m256(a), __m256(b))); }
+PADE_INLINE V sqrt(V a) { return V(_mm256_sqrt_ps(__m256(a))); }
+PADE_INLINE V gather(const float* base, I index) { return V(_mm256_i32gather_ps(base, __m256i(index), 4)); }
+#elif defined(__SSE2__)
+PADE_INLINE V min(V a, V b) { return V(_mm_min_ps(__m128(a), __m128(b))); }
+PADE_INLINE V max(V a, V b) { return V(_mm_max_ps(__m128(a), __m128(b))); }
+PADE_INLINE V sqrt(V a) { return V(_mm_sqrt_ps(__m128(a))); }
+PADE_INLINE V gather(const float* base, I index) {
+  return V{base[index[0]], base[index[1]], base[index[2]], base[index[3]]};
+}
+#else
+PADE_INLINE V min(V a, V b) { return a < b ? a : b; }
+PADE_INLINE V max(V a, V b) { return a > b ? a : b; }
+PADE_INLINE V sqrt(V a) {
+#if defined(__aarch64__)
+  return V(vsqrtq_f32(float32x4_t(a)));
+#else
+  return V{__builtin_sqrtf(a[0]), __builtin_sqrtf(a[1]), __builtin_sqrtf(a[2]), __builtin_sqrtf(a[3])};
+#endif
+}
+PADE_INLINE V gather(const float* base, I index) {
+  return V{base[index[0]], base[index[1]], base[index[2]], base[index[3]]};
+}
+#endif
+
+PADE_INLINE I truncate(V a) { return __builtin_convertvector(a, I); }
+PADE_INLINE V to_float(I a) { return __builtin_convertvector(a, V); }
+PADE_INLINE V abs(V a) { return V(I(a) & 0x7fffffff); }
+PADE_INLINE V select(I mask, V yes, V no) { return mask ? yes : no; }
+// Into [low, high]; NaN becomes low.
+PADE_INLINE V clamp(V a, float low, float high) { return min(max(a, set(low)), set(high)); }
+
+// The bilinear value of a plane at (x, y), which must lie in [0, width - 1] x [0, height - 1]. Rows have a
+// spare element behind their end and planes a spare row, so that the far corner needs no test.
+PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
+  const I ix = truncate(x);
+  const I iy = truncate(y);
+  const V ax = x - to_float(ix);
+  const V ay = y - to_float(iy);
+  const I at = iy * stride + ix;
+  const V a = gather(plane, at);
+  const V b = gather(plane + 1, at);
+  const V c = gather(plane + stride, at);
+  const V d = gather(plane + stride + 1, at);
+  const V top = a + ax * (b - a);
+  const V bottom = c + ax * (d - c);
+  return top + ay * (bottom - top);
+}
+
+// out = sum of taps[|i|] * rows[i], i = -radius to radius; `rows` points at the middle row's pointer.
+PADE_INLINE void convolve_vertical(const float* const* rows, const float* taps, int radius, float* out,
+                                   int n) {
+  constexpr int kBlock = 2;
+  for (int x = 0; x < n; x += kBlock * kLanes) {
+    V sum[kBlock];
+    for (int b = 0; b < kBlock; ++b) sum[b] = taps[0] * load(rows[0] + x + b * kLanes);
+    for (int i = 1; i <= radius; ++i) {
+      for (int b = 0; b < kBlock; ++b) {
+        sum[b] += taps[i] * (load(rows[-i] + x + b * kLanes) + load(rows[i] + x + b * kLanes));
+      }
+    }
+    for (int b = 0; b < kBlock; ++b) store(out + x + b * kLanes, sum[b]);
+  }
+}
+
+// The value at x of a row convolved with symmetric taps; reads `radius` elements to both sides.
+PADE_INLINE V convolve_horizontal(const float* row, const float* taps, int radius) {
+  V sum = taps[0] * load(row);
+  for (int i = 1; i <= radius; ++i) sum += taps[i] * (load(row - i) + load(row + i));
+  return sum;
+}
+
+// Every other element of two neighbouring vectors, and back.
+#if defined(__AVX512F__)
+PADE_INLINE V even(V a, V b) {
+  return __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+}
+PADE_INLINE V odd(V a, V b) {
+  return __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+}
+PADE_INLINE V zip_low(V a, V b) {
+  return __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+}
+PADE_INLINE V zip_high(V a, V b) {
+  return __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+}
+#elif defined(__AVX2__)
+PADE_INLINE V even(V a, V b) { return __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14); }
+PADE_INLINE V odd(V a, V b) { return __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15); }
+PADE_INLINE V zip_low(V a, V b) { return __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11); }
+PADE_INLINE V zip_high(V a, V b) { return __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15); }
+#else
+PADE_INLINE V even(V a, V b) { return __builtin_shufflevector(a, b, 0, 2, 4, 6); }
+PADE_INLINE V odd(V a, V b) { return __builtin_shufflevector(a, b, 1, 3, 5, 7); }
+PADE_INLINE V zip_low(V a, V b) { return __builtin_shufflevector(a, b, 0, 4, 1, 5); }
+PADE_INLINE V zip_high(V a, V b) { return __builtin_shufflevector(a, b, 2, 6, 3, 7); }
+#endif
+
+}  // namespace pade::flow::PADE_ISA

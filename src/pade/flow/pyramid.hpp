@@ -1,0 +1,41 @@
+// Image pyramids of floats and what all coarse-to-fine methods do with them.
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "pade/core/flow_field.hpp"
+#include "pade/flow/plane.hpp"
+
+namespace pade::flow {
+
+/// A pyramid with factor 2: level 0 is the image, grey values 0 to 255.
+struct Pyramid {
+  std::vector<Plane> levels;
+
+  /// @param image  CV_8UC1 or CV_16UC1 (divided by 257). @param count  levels, >= 1.
+  void build(const cv::Mat& image, int count);
+};
+
+/// Levels until the shorter side would fall below `smallest`, at least 1.
+int pyramid_levels(cv::Size size, int smallest);
+
+/// The window exp(-x^2 / 2 sigma^2), cut at `radius` and normalised to sum 1 over -radius to radius: taps 0
+/// to radius.
+std::vector<float> gaussian_taps(double sigma, int radius);
+
+/// The flow of one level.
+struct FlowPlanes {
+  Plane u;
+  Plane v;
+
+  void resize(int width, int height);
+};
+
+/// Splits CV_32FC2 of the full size into `flow` at 1 / 2^level of it, averaging blocks; NaN counts as zero.
+void load_flow(const cv::Mat& vectors, int level, FlowPlanes& flow);
+/// Interleaves into CV_32FC2.
+cv::Mat to_vectors(const FlowPlanes& flow);
+
+}  // namespace pade::flow

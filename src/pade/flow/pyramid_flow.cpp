@@ -1,0 +1,114 @@
+#include "pade/flow/pyramid_flow.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "pade/flow/kernels/pyramid_kernels.hpp"
+
+namespace pade::flow {
+namespace {
+
+bool usable(const cv::Mat& image) {
+  return !image.empty() && (image.type() == CV_8UC1 || image.type() == CV_16UC1);
+}
+
+// Rows below which a strip is not worth a thread.
+constexpr int kSmallestStrip = 16;
+
+// Lines that the kernels on single planes need at most (median of 5 x 5).
+constexpr int kPlaneLines = 5;
+
+}  // namespace
+
+PyramidFlow::PyramidFlow(const PyramidOptions& options)
+    : options_(options),
+      workers_(std::max(1, options.threads)),
+      scratch_(static_cast<std::size_t>(workers_.size())) {}
+
+FlowField PyramidFlow::estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) {
+  restart();
+  if (!usable(first) || !usable(second) || first.size() != second.size()) return {};
+  load(first, 0);
+  load(second, 1);
+  return run(0, 1, initial);
+}
+
+FlowField PyramidFlow::next(const cv::Mat& image, FlowReference reference, const cv::Mat& initial) {
+  if (!usable(image)) return {};
+  const bool continues = image.size() == stream_size_ && image.type() == stream_type_;
+  const int slot = 1 - newest_;
+  load(image, slot);
+  newest_ = slot;
+  stream_size_ = image.size();
+  stream_type_ = image.type();
+  if (!continues) return {};
+  return reference == FlowReference::previous ? run(1 - slot, slot, initial) : run(slot, 1 - slot, initial);
+}
+
+void PyramidFlow::restart() {
+  stream_size_ = {};
+  stream_type_ = -1;
+}
+
+void PyramidFlow::load(const cv::Mat& image, int slot) {
+  count_ = pyramid_levels(image.size(), options_.smallest_level);
+  const long planes = kPlaneLines * (padded(image.cols) + 2L * kRowMultiple);
+  const auto floats = static_cast<std::size_t>(std::max(planes, scratch_floats(image.cols)));
+  for (std::vector<float>& scratch : scratch_) {
+    if (scratch.size() < floats) scratch.assign(floats, 0.0F);
+  }
+  pyramids_[static_cast<std::size_t>(slot)].build(image, count_);
+  prepare(slot);
+}
+
+FlowField PyramidFlow::run(int from, int to, const cv::Mat& initial) {
+  for (int level = count_ - 1; level >= finest_level(); --level) {
+    start(level, initial);
+    refine(level, from, to, flow_);
+  }
+  if (finest_level() > 0) start(0, initial);
+  return {to_vectors(flow_), {}};
+}
+
+// The flow with which a level begins: the given one on the coarsest, else that of the coarser level.
+void PyramidFlow::start(int level, const cv::Mat& initial) {
+  const PlaneView& size = image(0, level);
+  if (level == count_ - 1) {
+    flow_.resize(size.width, size.height);
+    if (initial.size() == cv::Size(image(0, 0).width, image(0, 0).height) && initial.type() == CV_32FC2) {
+      load_flow(initial, level, flow_);
+    } else {
+      flow_.u.fill(0);
+      flow_.v.fill(0);
+    }
+    return;
+  }
+  spare_.resize(size.width, size.height);
+  over_rows(size.height, [&](int first, int last, float*) {
+    PADE_DISPATCH(upsample, isa_)(flow_.u.view(), spare_.u.view(), 2, first, last);
+    PADE_DISPATCH(upsample, isa_)(flow_.v.view(), spare_.v.view(), 2, first, last);
+  });
+  std::swap(flow_, spare_);
+}
+
+void PyramidFlow::over_rows(int height, const std::function<void(int, int, float*)>& work) {
+  const int strips = std::clamp(height / kSmallestStrip, 1, workers_.size());
+  if (strips == 1) return work(0, height, scratch_[0].data());
+  workers_.run([&](int i) {
+    if (i < strips)
+      work(height * i / strips, height * (i + 1) / strips, scratch_[static_cast<std::size_t>(i)].data());
+  });
+}
+
+void PyramidFlow::median(int size, FlowPlanes& flow, FlowPlanes& spare) {
+  if (size < 3) return;
+  auto* filter = size == 3 ? PADE_DISPATCH(median3, isa_) : PADE_DISPATCH(median5, isa_);
+  spare.resize(flow.u.width(), flow.u.height());
+  over_rows(flow.u.height(), [&](int first, int last, float* scratch) {
+    filter(flow.u.view(), spare.u.view(), first, last, scratch);
+    filter(flow.v.view(), spare.v.view(), first, last, scratch);
+  });
+  std::swap(flow, spare);
+}
+
+}  // namespace pade::flow

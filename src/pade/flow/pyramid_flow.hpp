@@ -1,0 +1,80 @@
+// What Lucas-Kanade, Farneback and CLG share: pyramids, coarse to fine, streams, half resolution, threads.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "pade/core/simd.hpp"
+#include "pade/flow/flow_estimator.hpp"
+#include "pade/flow/pyramid.hpp"
+#include "pade/flow/worker_pool.hpp"
+
+namespace pade::flow {
+
+/// Options of all our coarse-to-fine methods.
+struct PyramidOptions {
+  int smallest_level = 8;
+  bool half_resolution = false;
+  int threads = 1;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("smallest_level", self.smallest_level, "shorter side of the coarsest pyramid level, pixels");
+    field("half_resolution", self.half_resolution,
+          "stop at half the size and interpolate: about a quarter of the time, blunter edges");
+    field("threads", self.threads, "threads for one pair; the result does not depend on it");
+  }
+};
+
+/// A method that refines a flow on one pyramid level at a time.
+class PyramidFlow : public FlowEstimator {
+ public:
+  using FlowEstimator::estimate;
+  using FlowEstimator::next;
+  FlowField estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) final;
+  FlowField next(const cv::Mat& image, FlowReference reference, const cv::Mat& initial) final;
+  void restart() final;
+
+ protected:
+  explicit PyramidFlow(const PyramidOptions& options);
+
+  /// The image of a slot (0 or 1) has changed: compute what depends on it alone.
+  virtual void prepare(int slot) = 0;
+  /// Improves the flow from the image in slot `from` to that in slot `to` on one level.
+  virtual void refine(int level, int from, int to, FlowPlanes& flow) = 0;
+  /// Floats of scratch that each thread needs for images of this width.
+  [[nodiscard]] virtual long scratch_floats(int width) const = 0;
+
+  [[nodiscard]] const PlaneView& image(int slot, int level) const {
+    return pyramids_[static_cast<std::size_t>(slot)].levels[static_cast<std::size_t>(level)].view();
+  }
+  [[nodiscard]] int level_count() const { return count_; }
+  [[nodiscard]] int finest_level() const { return options_.half_resolution && count_ > 1 ? 1 : 0; }
+  [[nodiscard]] simd::InstructionSet isa() const { return isa_; }
+
+  /// Runs work(first, last, scratch) over strips of rows that cover [0, height).
+  void over_rows(int height, const std::function<void(int, int, float*)>& work);
+  /// Median filter of both components; `size` 0, 3 or 5.
+  void median(int size, FlowPlanes& flow, FlowPlanes& spare);
+  WorkerPool& workers() { return workers_; }
+
+ private:
+  void load(const cv::Mat& image, int slot);
+  FlowField run(int from, int to, const cv::Mat& initial);
+  void start(int level, const cv::Mat& initial);
+
+  PyramidOptions options_;
+  simd::InstructionSet isa_ = simd::best();
+  WorkerPool workers_;
+  std::vector<std::vector<float>> scratch_;
+  std::array<Pyramid, 2> pyramids_;
+  int count_ = 1;
+  int newest_ = 0;
+  cv::Size stream_size_;
+  int stream_type_ = -1;
+  FlowPlanes flow_;
+  FlowPlanes spare_;
+};
+
+}  // namespace pade::flow

@@ -1,0 +1,236 @@
+// What every one of our own methods owes its users, whatever it does inside.
+#include "pade/flow/flow_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "pade/flow/clg.hpp"
+#include "pade/flow/farneback.hpp"
+#include "pade/flow/lucas_kanade.hpp"
+
+#include "flow/flow_scene.hpp"
+
+namespace pade::flow {
+namespace {
+
+using testing::shifted_pair;
+using testing::ShiftedPair;
+
+std::unique_ptr<FlowEstimator> make(const std::string& name, int threads = 1) {
+  if (threads == 1) {
+    auto method = make_flow_estimator(name);
+    EXPECT_TRUE(method.ok());
+    return std::move(method.value());
+  }
+  if (name == "lucas-kanade") {
+    LucasKanadeOptions options;
+    options.pyramid.threads = threads;
+    return make_lucas_kanade(options);
+  }
+  if (name == "farneback") {
+    FarnebackOptions options;
+    options.pyramid.threads = threads;
+    return make_farneback(options);
+  }
+  ClgOptions options = name == "clg-fast"       ? clg_fast_options()
+                       : name == "clg-accurate" ? clg_accurate_options()
+                                                : clg_linear_options();
+  options.pyramid.threads = threads;
+  return make_clg(options, name);
+}
+
+bool finite(const cv::Mat& vectors) { return cv::checkRange(vectors); }
+
+bool same_bits(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && !a.empty() && cv::norm(a, b, cv::NORM_INF) == 0;
+}
+
+double median_error(const cv::Mat& vectors, cv::Point2d truth, int border) {
+  std::vector<double> errors;
+  for (int y = border; y < vectors.rows - border; ++y) {
+    for (int x = border; x < vectors.cols - border; ++x) {
+      const auto& w = vectors.at<cv::Vec2f>(y, x);
+      errors.push_back(std::hypot(w[0] - truth.x, w[1] - truth.y));
+    }
+  }
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
+                   errors.end());
+  return errors[errors.size() / 2];
+}
+
+class OwnFlow : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(OwnFlow, FindsAShiftToASmallPartOfAPixel) {
+  for (const cv::Point2d shift : {cv::Point2d(0, 0), cv::Point2d(0.4, -0.3), cv::Point2d(-2.7, 1.6),
+                                  cv::Point2d(7.3, 4.2), cv::Point2d(-4, -12)}) {
+    const ShiftedPair pair = shifted_pair({160, 120}, shift);
+    const FlowField field = make(GetParam())->estimate(pair.first, pair.second);
+    EXPECT_LT(median_error(field.vectors, shift, 20), 0.08) << shift;
+  }
+}
+
+TEST_P(OwnFlow, FindsAZoom) {
+  const testing::Waves waves(3);
+  const cv::Size size(200, 160);
+  const cv::Point2d centre(99.5, 79.5);
+  // second(p + w) = first(p) with w = 0.03 (p - centre), so second(q) = first(centre + (q - centre) / 1.03).
+  const cv::Mat first = testing::render(size, waves);
+  const cv::Mat second = testing::render(
+      size, waves, [&](double x, double y) { return centre + (cv::Point2d(x, y) - centre) / 1.03; });
+  const FlowField field = make(GetParam())->estimate(first, second);
+  std::vector<double> errors;
+  for (int y = 10; y < size.height - 10; ++y) {
+    for (int x = 10; x < size.width - 10; ++x) {
+      const cv::Point2d truth = (cv::Point2d(x, y) - centre) * 0.03;
+      const auto& w = field.vectors.at<cv::Vec2f>(y, x);
+      errors.push_back(std::hypot(w[0] - truth.x, w[1] - truth.y));
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.08);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.3);
+}
+
+TEST_P(OwnFlow, UsesTheInitialFlow) {
+  const cv::Point2d shift(70, -55);  // far beyond what the pyramid of so small an image can find
+  const ShiftedPair pair = shifted_pair({192, 160}, shift);
+  const cv::Mat initial(pair.first.size(), CV_32FC2, cv::Scalar(shift.x + 1.5, shift.y - 1));
+  const FlowField field = make(GetParam())->estimate(pair.first, pair.second, initial);
+  const cv::Mat seen = field.vectors(cv::Rect(20, 75, 80, 65));
+  EXPECT_LT(median_error(seen, shift, 0), 0.1);
+}
+
+TEST_P(OwnFlow, SurvivesEverySize) {
+  auto method = make(GetParam());
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(2, 1), cv::Size(1, 2), cv::Size(1, 37),
+                              cv::Size(37, 1), cv::Size(3, 5), cv::Size(16, 16), cv::Size(17, 33),
+                              cv::Size(31, 64), cv::Size(65, 47), cv::Size(129, 3), cv::Size(101, 99)}) {
+    const ShiftedPair pair = shifted_pair(size, {0.5, 0.25});
+    const FlowField field = method->estimate(pair.first, pair.second);
+    ASSERT_EQ(field.vectors.size(), size);
+    EXPECT_TRUE(finite(field.vectors)) << size;
+  }
+}
+
+TEST_P(OwnFlow, SurvivesImagesThatSayNothing) {
+  auto method = make(GetParam());
+  const cv::Size size(75, 61);
+  cv::Mat noise(size, CV_8UC1);
+  cv::randu(noise, 0, 256);
+  cv::Mat stripes(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) stripes.at<std::uint8_t>(y, x) = (x + y) % 2 == 0 ? 0 : 255;
+  }
+  cv::Mat diagonal(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) diagonal.at<std::uint8_t>(y, x) = x + y > 60 ? 255 : 0;
+  }
+  const std::vector<cv::Mat> images = {cv::Mat(size, CV_8UC1, cv::Scalar(0)),
+                                       cv::Mat(size, CV_8UC1, cv::Scalar(255)), noise, stripes, diagonal};
+  for (const cv::Mat& first : images) {
+    for (const cv::Mat& second : images) {
+      const FlowField field = method->estimate(first, second);
+      EXPECT_TRUE(finite(field.vectors));
+      EXPECT_LT(cv::norm(field.vectors, cv::NORM_INF), 1000);
+    }
+  }
+  const FlowField still = method->estimate(images[0], images[0]);
+  EXPECT_EQ(cv::norm(still.vectors, cv::NORM_INF), 0) << "nothing moves in a black image";
+}
+
+TEST_P(OwnFlow, IsTheSameForAViewAndItsCopy) {
+  const ShiftedPair pair = shifted_pair({150, 130}, {1.5, -0.5});
+  const cv::Rect part(13, 7, 101, 93);
+  auto method = make(GetParam());
+  const FlowField of_view = method->estimate(pair.first(part), pair.second(part));
+  const FlowField of_copy = method->estimate(pair.first(part).clone(), pair.second(part).clone());
+  EXPECT_TRUE(same_bits(of_view.vectors, of_copy.vectors));
+}
+
+TEST_P(OwnFlow, TakesSixteenBitImages) {
+  const ShiftedPair pair = shifted_pair({96, 80}, {1.25, 0.75});
+  cv::Mat first;
+  cv::Mat second;
+  pair.first.convertTo(first, CV_16U, 257);
+  pair.second.convertTo(second, CV_16U, 257);
+  auto method = make(GetParam());
+  const cv::Mat wide = method->estimate(first, second).vectors;
+  const cv::Mat narrow = method->estimate(pair.first, pair.second).vectors;
+  cv::Mat difference;
+  cv::absdiff(wide, narrow, difference);
+  EXPECT_LT(cv::mean(difference)[0] + cv::mean(difference)[1], 1e-3);
+}
+
+TEST_P(OwnFlow, RefusesImagesThatDoNotFit) {
+  auto method = make(GetParam());
+  const cv::Mat image(40, 40, CV_8UC1, cv::Scalar(7));
+  EXPECT_TRUE(method->estimate(image, cv::Mat(40, 41, CV_8UC1)).empty());
+  EXPECT_TRUE(method->estimate(image, cv::Mat()).empty());
+  EXPECT_TRUE(method->estimate(cv::Mat(), cv::Mat()).empty());
+  EXPECT_TRUE(method->estimate(image, cv::Mat(40, 40, CV_8UC3)).empty());
+  EXPECT_FALSE(method->estimate(image, image, cv::Mat(3, 3, CV_32FC2)).empty())
+      << "a misfit guess is ignored";
+}
+
+TEST_P(OwnFlow, DoesNotDependOnTheNumberOfThreadsNorOnThePast) {
+  const ShiftedPair pair = shifted_pair({203, 151}, {3.5, -2.25});
+  auto one = make(GetParam());
+  const cv::Mat expected = one->estimate(pair.first, pair.second).vectors;
+  one->estimate(pair.second, pair.first);
+  one->estimate(pair.first(cv::Rect(0, 0, 40, 50)), pair.second(cv::Rect(0, 0, 40, 50)));
+  EXPECT_TRUE(same_bits(one->estimate(pair.first, pair.second).vectors, expected));
+  for (const int threads : {2, 3, 4}) {
+    EXPECT_TRUE(same_bits(make(GetParam(), threads)->estimate(pair.first, pair.second).vectors, expected))
+        << threads;
+  }
+}
+
+TEST_P(OwnFlow, OfAStreamIsThatOfItsPairs) {
+  const testing::Waves waves(5);
+  std::vector<cv::Mat> images;
+  for (int i = 0; i < 4; ++i) {
+    images.push_back(testing::render(
+        {110, 90}, waves, [i](double x, double y) { return cv::Point2d(x - 1.3 * i, y + 0.4 * i * i); }));
+  }
+  auto stream = make(GetParam());
+  auto pairs = make(GetParam());
+  EXPECT_TRUE(stream->next(images[0]).empty());
+  for (std::size_t i = 1; i < images.size(); ++i) {
+    const bool newest = i % 2 == 0;
+    const FlowField field = stream->next(images[i], newest ? FlowReference::newest : FlowReference::previous);
+    const FlowField expected =
+        newest ? pairs->estimate(images[i], images[i - 1]) : pairs->estimate(images[i - 1], images[i]);
+    EXPECT_TRUE(same_bits(field.vectors, expected.vectors)) << i;
+  }
+  EXPECT_TRUE(stream->next(images[0](cv::Rect(0, 0, 50, 50))).empty())
+      << "another size begins another stream";
+  stream->restart();
+  EXPECT_TRUE(stream->next(images[0]).empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, OwnFlow,
+                         ::testing::Values("lucas-kanade", "farneback", "clg-linear", "clg-fast",
+                                           "clg-accurate"),
+                         [](const auto& name) {
+                           std::string text = name.param;
+                           std::replace(text.begin(), text.end(), '-', '_');
+                           return text;
+                         });
+
+TEST(FlowEstimatorNames, AllCanBeMadeAndKnowTheirName) {
+  for (const std::string& name : flow_estimator_names()) {
+    const auto method = make_flow_estimator(name);
+    ASSERT_TRUE(method.ok()) << name;
+    EXPECT_EQ((*method)->name(), name);
+  }
+  const auto unknown = make_flow_estimator("horn-schunk");
+  ASSERT_FALSE(unknown.ok());
+  EXPECT_NE(unknown.error().message.find("clg-fast"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace pade::flow
