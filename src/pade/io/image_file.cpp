@@ -199,6 +199,9 @@ std::optional<Error> png_defect(const Bytes& bytes) {
 }
 
 Result<cv::Mat> decode(const Bytes& bytes) {
+  constexpr std::size_t kShortest = 8;  // fewer bytes hold no header, and OpenCV would print about it
+  if (bytes.size() < kShortest)
+    return Error{fmt::format("cannot be decoded: it has only {} bytes", bytes.size())};
   cv::Mat image;
   try {  // OpenCV throws on sizes it refuses and on allocation
     image = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
