@@ -36,12 +36,12 @@ class Converter {
       for (const auto& entry : node) {
         if (!entry.first.IsScalar()) return fmt::format("line {}: a key is not text", out.line);
         const std::string key = entry.first.Scalar();
-        const auto same = [&](const auto& pair) { return pair.first == key; };
+        const auto same = [&](const Yaml::Entry& other) { return other.key == key; };
         if (std::any_of(out.map.begin(), out.map.end(), same)) {
           return fmt::format("line {}: field {} appears twice", entry.first.Mark().line + 1, key);
         }
-        out.map.emplace_back(key, Yaml{});
-        if (auto problem = convert(entry.second, out.map.back().second, depth + 1)) return problem;
+        out.map.push_back({key, {}});
+        if (auto problem = convert(entry.second, out.map.back().value, depth + 1)) return problem;
       }
     }
     return std::nullopt;

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "pade/core/result.hpp"
@@ -18,10 +17,16 @@ struct Yaml {
   std::size_t line = 0;  ///< in the file, from 1
   std::string scalar;    ///< text, where `kind` is scalar
   std::vector<Yaml> list;
-  std::vector<std::pair<std::string, Yaml>> map;  ///< in the order of the file; keys are unique
+  struct Entry;
+  std::vector<Entry> map;  ///< in the order of the file; keys are unique
 
   /// The value of a key of a map; null where there is none (or no map, or its value is empty).
   [[nodiscard]] const Yaml* find(std::string_view key) const;
+};
+
+struct Yaml::Entry {
+  std::string key;
+  Yaml value;
 };
 
 /// Parses the first document of `text`. `file` is the name in messages. Refused: malformed YAML, a key that
