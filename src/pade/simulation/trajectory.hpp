@@ -3,11 +3,15 @@
 // form.
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
 #include "pade/simulation/sensors/kinematics.hpp"
@@ -92,3 +96,16 @@ class Trajectory {
 };
 
 }  // namespace pade::simulation
+
+template <>
+struct pade::EnumNames<pade::simulation::Heading> {
+  static constexpr std::array names = {
+      std::pair{pade::simulation::Heading::waypoint, std::string_view("waypoint")},
+      std::pair{pade::simulation::Heading::path, std::string_view("path")}};
+};
+template <>
+struct pade::EnumNames<pade::simulation::PathEnd> {
+  static constexpr std::array names = {
+      std::pair{pade::simulation::PathEnd::moving, std::string_view("moving")},
+      std::pair{pade::simulation::PathEnd::rest, std::string_view("rest")}};
+};

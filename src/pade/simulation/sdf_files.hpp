@@ -1,0 +1,30 @@
+// Where the files that an SDF world names lie, and whether they may be loaded at all: libsdformat follows a
+// cyclic include until the stack ends, and prints (but does not return) an error for a version that it does
+// not know.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pade/core/result.hpp"
+
+namespace pade::simulation {
+
+/// Folders in which model://NAME and relative names are looked for, in this order after the folder of the
+/// file that names them.
+using ResourcePaths = std::vector<std::filesystem::path>;
+
+/// The file or folder that a URI (file://, model://, or a plain path) means; empty where there is none.
+std::optional<std::filesystem::path> resolve_uri(const std::string& uri, const std::filesystem::path& base,
+                                                 const ResourcePaths& resources);
+
+/// The SDF file of a model folder (by model.config, else model.sdf), or the path itself where it is a file.
+std::optional<std::filesystem::path> model_file(const std::filesystem::path& path);
+
+/// Checks a file and all that it includes: it can be read, its version is 1.0 to 1.9, included files exist,
+/// and none includes itself.
+Status check_sdf_files(const std::filesystem::path& file, const ResourcePaths& resources);
+
+}  // namespace pade::simulation

@@ -1,0 +1,20 @@
+// What an SDF file holds and the simulator does not show, so that nothing is left out in silence.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <sdf/Element.hh>
+
+namespace pade::simulation {
+
+/// One sentence per kind of element that is in the file and has no effect, with the place of its first
+/// appearance. Elements that concern dynamics, contacts and user interfaces are not worth a word: there is
+/// nothing to show of them.
+std::vector<std::string> unsupported_elements(const sdf::ElementPtr& root, const std::string& file);
+
+/// The first error among what libsdformat printed (it prints some errors without returning them).
+std::optional<std::string> printed_error(const std::string& printed);
+
+}  // namespace pade::simulation

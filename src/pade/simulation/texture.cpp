@@ -1,0 +1,129 @@
+#include "pade/simulation/texture.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+#include "pade/simulation/mesh_file.hpp"
+
+namespace pade::simulation {
+namespace {
+
+constexpr float kFullScale = 65535;
+constexpr int kMostTaps = 8;
+
+int power_of_two(int pixels) {
+  constexpr int kLargest = 4096;
+  return std::min(static_cast<int>(std::bit_ceil(static_cast<unsigned>(pixels))), kLargest);
+}
+
+}  // namespace
+
+Texture::Texture(const cv::Mat& pixels, const Eigen::Vector2f& size) {
+  cv::Mat image = pixels;
+  const cv::Size fitting(power_of_two(pixels.cols), power_of_two(pixels.rows));
+  if (fitting != pixels.size()) cv::resize(pixels, image, fitting, 0, 0, cv::INTER_LINEAR);
+  texels_per_unit_ = Eigen::Vector2f(static_cast<float>(fitting.width) / size.x(),
+                                     static_cast<float>(fitting.height) / size.y());
+  while (true) {
+    Level level{image.cols, image.rows, {}};
+    level.texels.reserve(image.total());
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        const auto& p = image.at<cv::Vec3f>(y, x);
+        const auto quantised = [](float value) {
+          return static_cast<std::uint16_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * kFullScale));
+        };
+        level.texels.emplace_back(quantised(p[0]), quantised(p[1]), quantised(p[2]), std::uint16_t{0});
+      }
+    }
+    levels_.push_back(std::move(level));
+    if (image.total() == 1) break;
+    cv::Mat half;
+    cv::resize(image, half, {std::max(image.cols / 2, 1), std::max(image.rows / 2, 1)}, 0, 0, cv::INTER_AREA);
+    image = half;
+  }
+}
+
+Texture Texture::from_image(const cv::Mat& bgr) {
+  cv::Mat linear(bgr.size(), CV_32FC3);
+  std::array<float, 256> table{};
+  for (std::size_t i = 0; i < table.size(); ++i)
+    table[i] = static_cast<float>(linear_from_srgb(static_cast<double>(i) / 255));
+  for (int y = 0; y < bgr.rows; ++y) {
+    for (int x = 0; x < bgr.cols; ++x) {
+      const auto& p = bgr.at<cv::Vec3b>(y, x);
+      linear.at<cv::Vec3f>(y, x) = {table[p[2]], table[p[1]], table[p[0]]};
+    }
+  }
+  return {linear, {1, 1}};
+}
+
+Texture Texture::from_pattern(PatternKind kind) {
+  const PatternTile tile = draw_pattern(kind);
+  return {tile.pixels, {tile.size, tile.size}};
+}
+
+Texture Texture::clouds() {
+  constexpr float kSize = 23;
+  cv::Mat grey = 0.5 + 0.5 * draw_noise(256, 2, 2, 5, 0.55F, 77);
+  cv::Mat pixels;
+  cv::merge(std::vector<cv::Mat>{grey, grey, grey}, pixels);
+  return {pixels, {kSize, kSize}};
+}
+
+Eigen::Array4f Texture::bilinear(const Level& level, float x, float y) {
+  const float left = std::floor(x - 0.5F);
+  const float top = std::floor(y - 0.5F);
+  const float fx = x - 0.5F - left;
+  const float fy = y - 0.5F - top;
+  const int x0 = static_cast<int>(left) & (level.width - 1);
+  const int y0 = static_cast<int>(top) & (level.height - 1);
+  const int x1 = (x0 + 1) & (level.width - 1);
+  const int y1 = (y0 + 1) & (level.height - 1);
+  const auto texel = [&](int column, int row) -> Eigen::Array4f {
+    return level.texels[static_cast<std::size_t>(row * level.width + column)].cast<float>();
+  };
+  return (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x1, y0)) +
+         fy * ((1 - fx) * texel(x0, y1) + fx * texel(x1, y1));
+}
+
+Eigen::Array3f Texture::sample(const Eigen::Vector2f& at, const Eigen::Vector2f& across,
+                               const Eigen::Vector2f& down) const {
+  const Eigen::Vector2f position = at.cwiseProduct(texels_per_unit_);
+  Eigen::Vector2f longer = across.cwiseProduct(texels_per_unit_);
+  Eigen::Vector2f shorter = down.cwiseProduct(texels_per_unit_);
+  if (longer.squaredNorm() < shorter.squaredNorm()) std::swap(longer, shorter);
+  const float length = std::min(longer.norm(), 1e6F);
+  // The width of the parallelogram across its longer side.
+  const float width = length > 0 ? std::abs(longer.x() * shorter.y() - longer.y() * shorter.x()) / length : 0;
+  const int taps = std::clamp(static_cast<int>(std::ceil(length / std::max(width, 1.0F))), 1, kMostTaps);
+  const float footprint = std::max(length / static_cast<float>(taps), width);
+  const float level =
+      std::clamp(std::log2(std::max(footprint, 1.0F)), 0.0F, static_cast<float>(levels_.size() - 1));
+  const auto fine = static_cast<std::size_t>(level);
+  const std::size_t coarse = std::min(fine + 1, levels_.size() - 1);
+  const float blend = level - static_cast<float>(fine);
+
+  Eigen::Array4f sum = Eigen::Array4f::Zero();
+  for (int tap = 0; tap < taps; ++tap) {
+    const float along = (static_cast<float>(tap) + 0.5F) / static_cast<float>(taps) - 0.5F;
+    const Eigen::Vector2f p = position + along * longer;
+    const auto value = [&](std::size_t index) {
+      const Level& chosen = levels_[index];
+      return bilinear(chosen, p.x() * static_cast<float>(chosen.width) / static_cast<float>(levels_[0].width),
+                      p.y() * static_cast<float>(chosen.height) / static_cast<float>(levels_[0].height));
+    };
+    sum += (1 - blend) * value(fine);
+    if (blend > 0) sum += blend * value(coarse);
+  }
+  return (sum / (static_cast<float>(taps) * kFullScale)).head<3>();
+}
+
+Eigen::Array3f Texture::mean() const {
+  return levels_.back().texels.front().cast<float>().head<3>() / kFullScale;
+}
+
+}  // namespace pade::simulation
