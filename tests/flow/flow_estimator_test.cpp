@@ -8,9 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pade/flow/clg.hpp"
-#include "pade/flow/farneback.hpp"
-#include "pade/flow/lucas_kanade.hpp"
+#include "pade/flow/opencv_adapter.hpp"
 
 #include "flow/flow_scene.hpp"
 
@@ -20,27 +18,10 @@ namespace {
 using testing::shifted_pair;
 using testing::ShiftedPair;
 
-std::unique_ptr<FlowEstimator> make(const std::string& name, int threads = 1) {
-  if (threads == 1) {
-    auto method = make_flow_estimator(name);
-    EXPECT_TRUE(method.ok());
-    return std::move(method.value());
-  }
-  if (name == "lucas-kanade") {
-    LucasKanadeOptions options;
-    options.pyramid.threads = threads;
-    return make_lucas_kanade(options);
-  }
-  if (name == "farneback") {
-    FarnebackOptions options;
-    options.pyramid.threads = threads;
-    return make_farneback(options);
-  }
-  ClgOptions options = name == "clg-fast"       ? clg_fast_options()
-                       : name == "clg-accurate" ? clg_accurate_options()
-                                                : clg_linear_options();
-  options.pyramid.threads = threads;
-  return make_clg(options, name);
+std::unique_ptr<FlowEstimator> make(const std::string& name, const FlowOptions& options = {}) {
+  auto method = make_flow_estimator(name, options);
+  EXPECT_TRUE(method.ok());
+  return std::move(method.value());
 }
 
 bool finite(const cv::Mat& vectors) { return cv::checkRange(vectors); }
@@ -184,8 +165,10 @@ TEST_P(OwnFlow, DoesNotDependOnTheNumberOfThreadsNorOnThePast) {
   one->estimate(pair.first(cv::Rect(0, 0, 40, 50)), pair.second(cv::Rect(0, 0, 40, 50)));
   EXPECT_TRUE(same_bits(one->estimate(pair.first, pair.second).vectors, expected));
   for (const int threads : {2, 3, 4}) {
-    EXPECT_TRUE(same_bits(make(GetParam(), threads)->estimate(pair.first, pair.second).vectors, expected))
-        << threads;
+    FlowOptions options;
+    options.threads = threads;
+    const FlowField field = make(GetParam(), options)->estimate(pair.first, pair.second);
+    EXPECT_TRUE(same_bits(field.vectors, expected)) << threads;
   }
 }
 
@@ -210,6 +193,81 @@ TEST_P(OwnFlow, OfAStreamIsThatOfItsPairs) {
       << "another size begins another stream";
   stream->restart();
   EXPECT_TRUE(stream->next(images[0]).empty());
+}
+
+TEST_P(OwnFlow, LeavesMaskedPixelsOutAndLearnsNothingFromThem) {
+  const cv::Point2d shift(1.5, -1);
+  const ShiftedPair pair = shifted_pair({160, 120}, shift);
+  cv::Mat mask(pair.first.size(), CV_8UC1, cv::Scalar(255));
+  const cv::Rect hidden(60, 40, 40, 40);
+  mask(hidden) = 0;
+  cv::Mat painted = pair.first.clone();
+  cv::randu(painted(hidden), 0, 256);
+  auto method = make(GetParam());
+  method->set_mask(mask);
+  const cv::Mat vectors = method->estimate(painted, pair.second).vectors;
+  EXPECT_TRUE(std::isnan(vectors.at<cv::Vec2f>(60, 80)[0]));
+  EXPECT_TRUE(std::isnan(vectors.at<cv::Vec2f>(40, 60)[1]));
+  EXPECT_LT(median_error(vectors(cv::Rect(102, 40, 12, 40)), shift, 0), 0.15);
+  method->set_mask(cv::Mat());
+  EXPECT_TRUE(finite(method->estimate(painted, pair.second).vectors));
+}
+
+TEST_P(OwnFlow, OfARegionIsThatOfThePictureThere) {
+  const ShiftedPair pair = shifted_pair({200, 160}, {1.2, 0.7});
+  auto method = make(GetParam());
+  const cv::Rect region(70, 60, 50, 40);
+  const FlowField part = estimate_region(*method, pair.first, pair.second, region);
+  ASSERT_EQ(part.vectors.size(), pair.first.size());
+  EXPECT_TRUE(std::isnan(part.vectors.at<cv::Vec2f>(59, 70)[0]));
+  EXPECT_LT(median_error(part.vectors(region), {1.2, 0.7}, 0), 0.08);
+  EXPECT_TRUE(estimate_region(*method, pair.first, pair.second, cv::Rect(900, 0, 5, 5)).empty());
+}
+
+TEST_P(OwnFlow, IsLessSureWhereThereIsNothingToSeeOrNothingToMatch) {
+  const ShiftedPair pair = shifted_pair({160, 120}, {2, 1});
+  cv::Mat first = pair.first.clone();
+  cv::Mat second = pair.second.clone();
+  first(cv::Rect(0, 0, 50, 120)) = 128;
+  second(cv::Rect(0, 0, 50, 120)) = 128;
+  cv::randu(second(cv::Rect(100, 20, 40, 80)), 0, 256);
+  for (const FlowConfidence confidence : {FlowConfidence::local, FlowConfidence::forward_backward}) {
+    FlowOptions options;
+    options.confidence = confidence;
+    const FlowField field = make(GetParam(), options)->estimate(first, second);
+    ASSERT_EQ(field.sigma.size(), first.size());
+    ASSERT_EQ(field.sigma.type(), CV_32FC1);
+    const double sure = cv::mean(field.sigma(cv::Rect(65, 30, 20, 60)))[0];
+    EXPECT_LT(sure, 0.2);
+    EXPECT_GT(cv::mean(field.sigma(cv::Rect(15, 30, 15, 60)))[0], 5 * sure);
+    EXPECT_GT(cv::mean(field.sigma(cv::Rect(110, 40, 20, 40)))[0], 3 * sure);
+    EXPECT_GE(cv::norm(field.sigma.row(119), cv::NORM_INF), 1e30) << "what leaves the image is unknown";
+  }
+  EXPECT_TRUE(make(GetParam())->estimate(first, second).sigma.empty());
+}
+
+TEST_P(OwnFlow, AtHalfResolutionStillFindsTheShift) {
+  const ShiftedPair pair = shifted_pair({200, 160}, {3.3, -1.8}, 9);
+  FlowOptions options;
+  options.half_resolution = true;
+  const FlowField field = make(GetParam(), options)->estimate(pair.first, pair.second);
+  ASSERT_EQ(field.vectors.size(), pair.first.size());
+  EXPECT_LT(median_error(field.vectors, {3.3, -1.8}, 20), 0.2);
+}
+
+TEST_P(OwnFlow, IsTheSameThroughOpenCvsInterface) {
+  const ShiftedPair pair = shifted_pair({90, 70}, {1, 2});
+  const cv::Ptr<cv::DenseOpticalFlow> adapter = create_dense_optical_flow(GetParam());
+  ASSERT_TRUE(adapter);
+  cv::Mat vectors;
+  adapter->calc(pair.first, pair.second, vectors);
+  EXPECT_TRUE(same_bits(vectors, make(GetParam())->estimate(pair.first, pair.second).vectors));
+  const cv::Mat guess(pair.first.size(), CV_32FC2, cv::Scalar(1, 2));
+  vectors = guess.clone();
+  adapter->calc(pair.first, pair.second, vectors);
+  EXPECT_TRUE(same_bits(vectors, make(GetParam())->estimate(pair.first, pair.second, guess).vectors));
+  EXPECT_THROW(adapter->calc(pair.first, cv::Mat(3, 3, CV_8UC1), vectors), cv::Exception);
+  EXPECT_FALSE(create_dense_optical_flow("no such method"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, OwnFlow,

@@ -67,8 +67,10 @@ class Clg final : public PyramidFlow {
     const int height = flow.u.height();
     memory.resize(flow.u.width(), height);
     const bool finest = index == finest_level();
-    for (int warp = 0; warp < (finest ? options_.warps : options_.coarse_warps); ++warp) {
-      const ClgLevel level = view(memory, image(from, index), image(to, index), flow);
+    const int warps = finest ? options_.warps : options_.coarse_warps;
+    for (int warp = 0; warp < warps; ++warp) {
+      ClgLevel level = view(memory, image(from, index), image(to, index), flow);
+      level.mask = mask(index);
       over_rows(height, [&](int first, int last, float*) {
         for (int y = first; y < last; ++y) {
           std::copy_n(level.u.row(y), level.u.stride, level.u0.row(y));
@@ -135,22 +137,35 @@ class Clg final : public PyramidFlow {
 }  // namespace
 
 ClgOptions clg_fast_options() { return {}; }
-ClgOptions clg_accurate_options() {
+
+ClgOptions clg_half_options() {
   ClgOptions options;
-  options.warps = options.coarse_warps = 4;
-  options.lagged = 2;
-  options.sweeps = 15;
+  options.pyramid.half_resolution = true;
+  options.warps = 4;
   return options;
 }
+
+ClgOptions clg_accurate_options() {
+  ClgOptions options;
+  options.warps = 4;
+  options.coarse_warps = 12;
+  options.alpha = 3;
+  options.gamma = 5;
+  options.smooth_epsilon = 0.01;
+  return options;
+}
+
 ClgOptions clg_linear_options() {
   ClgOptions options;
-  options.alpha = 100;
-  options.rho = 1.5;
-  options.radius = 4;
   options.warps = 3;
+  options.coarse_warps = 3;
   options.sweeps = 30;
+  options.alpha = 100;
+  options.gamma = 0;
   options.data_epsilon = 0;
   options.smooth_epsilon = 0;
+  options.rho = 1.5;
+  options.radius = 4;
   return options;
 }
 

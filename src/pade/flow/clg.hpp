@@ -4,23 +4,23 @@
 #include <memory>
 #include <string>
 
-#include "pade/flow/pyramid_flow.hpp"
+#include "pade/flow/flow_estimator.hpp"
 
 namespace pade::flow {
 
 struct ClgOptions {
-  PyramidOptions pyramid;
+  FlowOptions pyramid;
   int warps = 1;
-  int coarse_warps = 3;
+  int coarse_warps = 5;
   int lagged = 1;
   int sweeps = 8;
   double omega = 1.9;
-  double alpha = 1;
-  double gamma = 0;
+  double alpha = 5;
+  double gamma = 10;
   double normalisation = 0;
   double data_epsilon = 1;
-  double smooth_epsilon = 0.05;
-  double rho = 0.6;
+  double smooth_epsilon = 0.02;
+  double rho = 0.4;
   int radius = 1;
   int median = 5;
   int coarse_median = 5;
@@ -48,6 +48,7 @@ struct ClgOptions {
 };
 
 ClgOptions clg_fast_options();
+ClgOptions clg_half_options();
 ClgOptions clg_accurate_options();
 ClgOptions clg_linear_options();
 

@@ -88,6 +88,7 @@ class Farneback final : public PyramidFlow {
     FarnebackLevel level;
     level.first = expansions_[static_cast<std::size_t>(from)][static_cast<std::size_t>(index)].view();
     level.second = expansions_[static_cast<std::size_t>(to)][static_cast<std::size_t>(index)].view();
+    level.mask = mask(index);
     level.taps = taps_.data();
     level.radius = options_.radius;
     level.damping = static_cast<float>(options_.damping);
@@ -116,6 +117,12 @@ class Farneback final : public PyramidFlow {
 };
 
 }  // namespace
+
+FarnebackOptions farneback_half_options() {
+  FarnebackOptions options;
+  options.pyramid.half_resolution = true;
+  return options;
+}
 
 std::unique_ptr<FlowEstimator> make_farneback(const FarnebackOptions& options, std::string name) {
   return std::make_unique<Farneback>(options, std::move(name));

@@ -4,12 +4,12 @@
 #include <memory>
 #include <string>
 
-#include "pade/flow/pyramid_flow.hpp"
+#include "pade/flow/flow_estimator.hpp"
 
 namespace pade::flow {
 
 struct FarnebackOptions {
-  PyramidOptions pyramid;
+  FlowOptions pyramid;
   int iterations = 2;
   int coarse_iterations = 3;
   int expansion_radius = 3;
@@ -37,6 +37,9 @@ struct FarnebackOptions {
           "size of the median filter after each coarser level: 0, 3 or 5");
   }
 };
+
+/// What suits half resolution, where an iteration costs a quarter.
+FarnebackOptions farneback_half_options();
 
 /// Two-frame motion from polynomial expansion (Farneback 2003).
 std::unique_ptr<FlowEstimator> make_farneback(const FarnebackOptions& options = {},

@@ -1,14 +1,17 @@
 // The interface of all optical-flow methods, and the factory that knows them by name.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "pade/core/flow_field.hpp"
+#include "pade/core/options.hpp"
 #include "pade/core/result.hpp"
 
 namespace pade::flow {
@@ -17,6 +20,32 @@ namespace pade::flow {
 enum class FlowReference {
   previous,  ///< previous(p) = newest(p + w)
   newest,    ///< newest(p) = previous(p + w): no latency
+};
+
+/// Where FlowField::sigma comes from.
+enum class FlowConfidence {
+  none,              ///< no sigma
+  local,             ///< texture and residual after warping, per pixel
+  forward_backward,  ///< and the error of the flow there and back, for twice the time
+};
+
+/// Options of all our own methods.
+struct FlowOptions {
+  int smallest_level = 8;
+  bool half_resolution = false;
+  FlowConfidence confidence = FlowConfidence::none;
+  int threads = 1;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("smallest_level", self.smallest_level,
+          "shorter side of the coarsest pyramid level, pixels, at least");
+    field("half_resolution", self.half_resolution,
+          "stop at half the size and interpolate: about a quarter of the time, blunter edges");
+    field("confidence", self.confidence,
+          "source of the standard deviations: none, local or forward_backward");
+    field("threads", self.threads, "threads for one pair; the result does not depend on it");
+  }
 };
 
 /// Dense optical flow between two images of one size. An object keeps buffers between calls: use one per
@@ -52,6 +81,12 @@ class FlowEstimator {
   /// Forgets the previous image of a stream.
   virtual void restart();
 
+  /// Leaves pixels of the first image out from now on: their data has no weight, and their flow is NaN.
+  /// @param mask  CV_8UC1 of the images' size, 0 = leave out; empty = use all. A mask of another size than
+  /// the
+  ///              images is not applied. OpenCV's methods ignore it.
+  virtual void set_mask(const cv::Mat& mask);
+
   /// The name that make_flow_estimator() knows.
   [[nodiscard]] virtual std::string_view name() const = 0;
 
@@ -63,6 +98,23 @@ class FlowEstimator {
 const std::vector<std::string>& flow_estimator_names();
 
 /// A method by its name; "dis" is "dis-medium". The error lists the names that exist.
-Result<std::unique_ptr<FlowEstimator>> make_flow_estimator(std::string_view name);
+/// @param options  for our own methods; OpenCV's ignore them.
+Result<std::unique_ptr<FlowEstimator>> make_flow_estimator(std::string_view name,
+                                                           const FlowOptions& options = {});
+
+/// Flow of a part of the images: only `region` and `margin` pixels around it are computed with.
+/// @return vectors (and sigma) of the images' size, NaN outside the region; empty where the images do not
+/// fit.
+FlowField estimate_region(FlowEstimator& method, const cv::Mat& first, const cv::Mat& second, cv::Rect region,
+                          int margin = 32);
 
 }  // namespace pade::flow
+
+template <>
+struct pade::EnumNames<pade::flow::FlowConfidence> {
+  static constexpr std::array names = {
+      std::pair{pade::flow::FlowConfidence::none, std::string_view("none")},
+      std::pair{pade::flow::FlowConfidence::local, std::string_view("local")},
+      std::pair{pade::flow::FlowConfidence::forward_backward, std::string_view("forward_backward")},
+  };
+};

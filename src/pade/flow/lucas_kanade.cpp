@@ -1,5 +1,8 @@
 #include "pade/flow/lucas_kanade.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,13 +14,19 @@
 namespace pade::flow {
 namespace {
 
+std::vector<float> local_mean_taps(double sigma) {
+  if (sigma <= 0) return {};
+  return gaussian_taps(sigma, std::clamp(static_cast<int>(std::lround(2 * sigma)), 1, kLargestSmoothRadius));
+}
+
 class LucasKanade final : public PyramidFlow {
  public:
   LucasKanade(const LucasKanadeOptions& options, std::string name)
       : PyramidFlow(options.pyramid),
         options_(options),
         name_(std::move(name)),
-        taps_(gaussian_taps(options.sigma, options.radius)) {}
+        taps_(gaussian_taps(options.sigma, options.radius)),
+        mean_taps_(local_mean_taps(options.local_mean)) {}
 
   [[nodiscard]] std::string_view name() const override { return name_; }
 
@@ -26,17 +35,32 @@ class LucasKanade final : public PyramidFlow {
     return PADE_DISPATCH(lucas_kanade_scratch, isa())(options_.radius, width);
   }
 
-  void prepare(int /*slot*/) override {}
+  void prepare(int slot) override {
+    if (mean_taps_.empty()) return;
+    std::vector<Plane>& filtered = filtered_[static_cast<std::size_t>(slot)];
+    filtered.resize(static_cast<std::size_t>(level_count()));
+    for (int index = finest_level(); index < level_count(); ++index) {
+      const PlaneView& from = image(slot, index);
+      Plane& to = filtered[static_cast<std::size_t>(index)];
+      to.resize(from.width, from.height);
+      over_rows(from.height, [&](int begin, int end, float* scratch) {
+        PADE_DISPATCH(smooth, isa())
+        (from, to.view(), mean_taps_.data(), static_cast<int>(mean_taps_.size()) - 1, begin, end, scratch);
+        PADE_DISPATCH(subtract_from, isa())(from, to.view(), begin, end);
+      });
+    }
+  }
 
   void refine(int index, int from, int to, FlowPlanes& flow) override {
-    const PlaneView& first = image(from, index);
+    const PlaneView& first = relative(from, index);
     for (Plane* plane : {&gradient_x_, &gradient_y_, &inverse_xx_, &inverse_xy_, &inverse_yy_}) {
       plane->resize(first.width, first.height);
     }
     spare_.resize(first.width, first.height);
     LucasKanadeLevel level;
     level.first = first;
-    level.second = image(to, index);
+    level.second = relative(to, index);
+    level.mask = mask(index);
     level.gradient_x = gradient_x_.view();
     level.gradient_y = gradient_y_.view();
     level.inverse_xx = inverse_xx_.view();
@@ -67,14 +91,30 @@ class LucasKanade final : public PyramidFlow {
   }
 
  private:
+  // The grey values less their local mean, or as they are where that is switched off.
+  [[nodiscard]] const PlaneView& relative(int slot, int index) const {
+    return mean_taps_.empty()
+               ? image(slot, index)
+               : filtered_[static_cast<std::size_t>(slot)][static_cast<std::size_t>(index)].view();
+  }
+
   LucasKanadeOptions options_;
   std::string name_;
   std::vector<float> taps_;
+  std::vector<float> mean_taps_;
+  std::array<std::vector<Plane>, 2> filtered_;
   Plane gradient_x_, gradient_y_, inverse_xx_, inverse_xy_, inverse_yy_;
   FlowPlanes spare_;
 };
 
 }  // namespace
+
+LucasKanadeOptions lucas_kanade_half_options() {
+  LucasKanadeOptions options;
+  options.pyramid.half_resolution = true;
+  options.iterations = 4;
+  return options;
+}
 
 std::unique_ptr<FlowEstimator> make_lucas_kanade(const LucasKanadeOptions& options, std::string name) {
   return std::make_unique<LucasKanade>(options, std::move(name));

@@ -1,8 +1,10 @@
 #include "pade/flow/pyramid_flow.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
+#include "pade/flow/kernels/confidence_kernels.hpp"
 #include "pade/flow/kernels/pyramid_kernels.hpp"
 
 namespace pade::flow {
@@ -15,15 +17,21 @@ bool usable(const cv::Mat& image) {
 // Rows below which a strip is not worth a thread.
 constexpr int kSmallestStrip = 16;
 
+// Window over which the confidence is judged, and the least noise of grey values that is assumed there.
+constexpr double kSigmaWindow = 2.5;
+constexpr int kSigmaRadius = 5;
+constexpr float kGreyNoise = 1.0F;
+
 // Lines that the kernels on single planes need at most (median of 5 x 5).
 constexpr int kPlaneLines = 5;
 
 }  // namespace
 
-PyramidFlow::PyramidFlow(const PyramidOptions& options)
+PyramidFlow::PyramidFlow(const FlowOptions& options)
     : options_(options),
       workers_(std::max(1, options.threads)),
-      scratch_(static_cast<std::size_t>(workers_.size())) {}
+      scratch_(static_cast<std::size_t>(workers_.size())),
+      sigma_taps_(gaussian_taps(kSigmaWindow, kSigmaRadius)) {}
 
 FlowField PyramidFlow::estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) {
   restart();
@@ -53,7 +61,9 @@ void PyramidFlow::restart() {
 void PyramidFlow::load(const cv::Mat& image, int slot) {
   count_ = pyramid_levels(image.size(), options_.smallest_level);
   const long planes = kPlaneLines * (padded(image.cols) + 2L * kRowMultiple);
-  const auto floats = static_cast<std::size_t>(std::max(planes, scratch_floats(image.cols)));
+  const auto floats =
+      static_cast<std::size_t>(std::max({planes, scratch_floats(image.cols),
+                                         PADE_DISPATCH(confidence_scratch, isa_)(kSigmaRadius, image.cols)}));
   for (std::vector<float>& scratch : scratch_) {
     if (scratch.size() < floats) scratch.assign(floats, 0.0F);
   }
@@ -62,12 +72,87 @@ void PyramidFlow::load(const cv::Mat& image, int slot) {
 }
 
 FlowField PyramidFlow::run(int from, int to, const cv::Mat& initial) {
+  FlowField field;
+  if (options_.confidence == FlowConfidence::forward_backward) {
+    // Backward first, so that the buffers end up with the forward flow's state.
+    masked_ = false;
+    coarse_to_fine(to, from, initial.empty() ? initial : cv::Mat(-initial));
+    std::swap(flow_, backward_);
+  }
+  build_mask();
+  coarse_to_fine(from, to, initial);
+  field.vectors = to_vectors(flow_);
+  if (options_.confidence != FlowConfidence::none) field.sigma = sigma(from, to);
+  if (masked_) field.vectors.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), mask_ == 0);
+  return field;
+}
+
+void PyramidFlow::coarse_to_fine(int from, int to, const cv::Mat& initial) {
   for (int level = count_ - 1; level >= finest_level(); --level) {
     start(level, initial);
     refine(level, from, to, flow_);
   }
   if (finest_level() > 0) start(0, initial);
-  return {to_vectors(flow_), {}};
+}
+
+cv::Mat PyramidFlow::sigma(int from, int to) {
+  ConfidenceInput input;
+  input.first = image(from, 0);
+  input.second = image(to, 0);
+  sigma_.resize(input.first.width, input.first.height);
+  input.u = flow_.u.view();
+  input.v = flow_.v.view();
+  if (options_.confidence == FlowConfidence::forward_backward) {
+    input.backward_u = backward_.u.view();
+    input.backward_v = backward_.v.view();
+  }
+  input.sigma = sigma_.view();
+  input.taps = sigma_taps_.data();
+  input.radius = kSigmaRadius;
+  input.noise = kGreyNoise;
+  double squares = 0;  // of the two-dimensional window: the square of the one-dimensional sum
+  for (std::size_t i = 0; i < sigma_taps_.size(); ++i) {
+    squares +=
+        (i == 0 ? 1.0 : 2.0) * static_cast<double>(sigma_taps_[i]) * static_cast<double>(sigma_taps_[i]);
+  }
+  input.effective_size = static_cast<float>(1 / (squares * squares));
+  over_rows(input.first.height, [&](int first, int last, float* scratch) {
+    PADE_DISPATCH(flow_sigma, isa_)(input, first, last, scratch);
+  });
+  cv::Mat result(input.first.height, input.first.width, CV_32FC1);
+  for (int y = 0; y < result.rows; ++y) std::copy_n(sigma_.row(y), result.cols, result.ptr<float>(y));
+  return result;
+}
+
+void PyramidFlow::set_mask(const cv::Mat& mask) { mask_ = mask.clone(); }
+
+// A coarse pixel is used if any of the four fine ones below it is.
+void PyramidFlow::build_mask() {
+  masked_ = mask_.type() == CV_8UC1 && mask_.size() == cv::Size(image(0, 0).width, image(0, 0).height);
+  if (!masked_) return;
+  mask_levels_.resize(static_cast<std::size_t>(count_));
+  cv::Mat used;
+  cv::compare(mask_, 0, used, cv::CMP_NE);
+  for (int level = 0; level < count_; ++level) {
+    const PlaneView& size = image(0, level);
+    Plane& plane = mask_levels_[static_cast<std::size_t>(level)];
+    plane.resize(size.width, size.height);
+    if (level > 0) {
+      cv::Mat coarse(size.height, size.width, CV_8UC1, cv::Scalar(0));
+      for (int y = 0; y < used.rows; ++y) {
+        for (int x = 0; x < used.cols; ++x)
+          coarse.at<std::uint8_t>(y / 2, x / 2) |= used.at<std::uint8_t>(y, x);
+      }
+      used = coarse;
+    }
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) plane.row(y)[x] = used.at<std::uint8_t>(y, x) != 0 ? 1.0F : 0.0F;
+    }
+  }
+}
+
+PlaneView PyramidFlow::mask(int level) const {
+  return masked_ ? mask_levels_[static_cast<std::size_t>(level)].view() : PlaneView{};
 }
 
 // The flow with which a level begins: the given one on the coarsest, else that of the coarser level.

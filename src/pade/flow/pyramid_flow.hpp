@@ -12,21 +12,6 @@
 
 namespace pade::flow {
 
-/// Options of all our coarse-to-fine methods.
-struct PyramidOptions {
-  int smallest_level = 8;
-  bool half_resolution = false;
-  int threads = 1;
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& field) {
-    field("smallest_level", self.smallest_level, "shorter side of the coarsest pyramid level, pixels");
-    field("half_resolution", self.half_resolution,
-          "stop at half the size and interpolate: about a quarter of the time, blunter edges");
-    field("threads", self.threads, "threads for one pair; the result does not depend on it");
-  }
-};
-
 /// A method that refines a flow on one pyramid level at a time.
 class PyramidFlow : public FlowEstimator {
  public:
@@ -35,9 +20,10 @@ class PyramidFlow : public FlowEstimator {
   FlowField estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) final;
   FlowField next(const cv::Mat& image, FlowReference reference, const cv::Mat& initial) final;
   void restart() final;
+  void set_mask(const cv::Mat& mask) final;
 
  protected:
-  explicit PyramidFlow(const PyramidOptions& options);
+  explicit PyramidFlow(const FlowOptions& options);
 
   /// The image of a slot (0 or 1) has changed: compute what depends on it alone.
   virtual void prepare(int slot) = 0;
@@ -49,6 +35,8 @@ class PyramidFlow : public FlowEstimator {
   [[nodiscard]] const PlaneView& image(int slot, int level) const {
     return pyramids_[static_cast<std::size_t>(slot)].levels[static_cast<std::size_t>(level)].view();
   }
+  /// 0 where a pixel of the first image has no weight; data null where all have.
+  [[nodiscard]] PlaneView mask(int level) const;
   [[nodiscard]] int level_count() const { return count_; }
   [[nodiscard]] int finest_level() const { return options_.half_resolution && count_ > 1 ? 1 : 0; }
   [[nodiscard]] simd::InstructionSet isa() const { return isa_; }
@@ -62,9 +50,12 @@ class PyramidFlow : public FlowEstimator {
  private:
   void load(const cv::Mat& image, int slot);
   FlowField run(int from, int to, const cv::Mat& initial);
+  void coarse_to_fine(int from, int to, const cv::Mat& initial);
   void start(int level, const cv::Mat& initial);
+  cv::Mat sigma(int from, int to);
+  void build_mask();
 
-  PyramidOptions options_;
+  FlowOptions options_;
   simd::InstructionSet isa_ = simd::best();
   WorkerPool workers_;
   std::vector<std::vector<float>> scratch_;
@@ -75,6 +66,12 @@ class PyramidFlow : public FlowEstimator {
   int stream_type_ = -1;
   FlowPlanes flow_;
   FlowPlanes spare_;
+  FlowPlanes backward_;
+  cv::Mat mask_;
+  std::vector<Plane> mask_levels_;
+  bool masked_ = false;  // the mask fits the present images and direction
+  Plane sigma_;
+  std::vector<float> sigma_taps_;
 };
 
 }  // namespace pade::flow

@@ -1,47 +1,9 @@
 #include "pade/flow/kernels/clg_kernels.hpp"
 
+#include "pade/flow/kernels/lines.hpp"
 #include "pade/flow/kernels/window.hpp"
 
 namespace pade::flow::PADE_ISA {
-namespace {
-
-int clamp_index(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
-
-void copy_with_edges(const float* from, float* line, int width) {
-  for (int x = 0; x < padded(width); x += kLanes) store(line + x, load(from + x));
-  for (int i = 1; i <= 4; ++i) line[-i] = line[0];
-  for (int i = width; i < padded(width) + 4; ++i) line[i] = line[width - 1];
-}
-
-// Lines of a plane with repeated edges; row y of the image at [y]. Each row is copied once.
-template <int kRows>
-struct Lines {
-  const PlaneView& plane;
-  float* memory;
-  int copied;
-
-  Lines(const PlaneView& from, float* scratch, int first) : plane(from), memory(scratch), copied(first) {}
-  static long floats(int width) { return kRows * (padded(width) + 2L * kRowMultiple); }
-  float* slot(int y) const {
-    return memory + ((y % kRows + kRows) % kRows) * (padded(plane.width) + 2L * kRowMultiple) + kRowMultiple;
-  }
-  // Makes rows up to `last` available.
-  void advance(int last) {
-    for (; copied <= last; ++copied)
-      copy_with_edges(plane.row(clamp_index(copied, plane.height)), slot(copied), plane.width);
-  }
-  const float* operator[](int y) const { return slot(y); }
-};
-
-PADE_INLINE V five_point(V far_back, V back, V ahead, V far_ahead) {
-  return (ahead - back) * (8.0F / 12) - (far_ahead - far_back) * (1.0F / 12);
-}
-PADE_INLINE V along_x(const float* line) {
-  return five_point(load(line - 2), load(line - 1), load(line + 1), load(line + 2));
-}
-
-}  // namespace
-
 long clg_scratch(int radius, int width) {
   const long window = window_scratch(6, radius, width);
   const long lines = 24L * (padded(width) + 2L * kRowMultiple);
@@ -117,7 +79,8 @@ void clg_tensor(const ClgLevel& level, int first, int last, float* scratch) {
           }
           const V at_x = load(level.u0.row(y) + x) + (ramp() + static_cast<float>(x));
           const V at_y = load(level.v0.row(y) + x) + static_cast<float>(y);
-          const I seen = I(at_x >= 0.0F) & I(at_x <= right) & I(at_y >= 0.0F) & I(at_y <= bottom);
+          I seen = I(at_x >= 0.0F) & I(at_x <= right) & I(at_y >= 0.0F) & I(at_y <= bottom);
+          if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
           store(out[0] + x, select(seen, xx, V{}));
           store(out[1] + x, select(seen, xy, V{}));
           store(out[2] + x, select(seen, yy, V{}));

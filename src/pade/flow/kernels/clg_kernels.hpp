@@ -32,6 +32,7 @@ struct ClgSystem {
 
 struct ClgLevel {
   PlaneView first, second;
+  PlaneView mask;                          ///< 0 = no data at this pixel of `first`; data null = all are used
   PlaneView mean, difference;              ///< of the first and the warped second image
   PlaneView u0, v0;                        ///< flow at which the second image was warped
   PlaneView u, v;                          ///< present flow

@@ -9,17 +9,11 @@
 //   (sum k A^T A + damping I) d = sum k A^T db + damping d_present.
 #include "pade/flow/kernels/farneback_kernels.hpp"
 
+#include "pade/flow/kernels/lines.hpp"
 #include "pade/flow/kernels/window.hpp"
 
 namespace pade::flow::PADE_ISA {
 namespace {
-
-int clamp_index(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
-
-void repeat_edges(float* line, int width, int radius) {
-  for (int i = 1; i <= radius; ++i) line[-i] = line[0];
-  for (int i = width; i < padded(width) + radius; ++i) line[i] = line[width - 1];
-}
 
 // The value of an antisymmetric filter: sum of taps[i] (row[i] - row[-i]).
 PADE_INLINE V convolve_odd(const float* row, const float* taps, int radius) {
@@ -95,7 +89,8 @@ void farneback_iterate(const FarnebackLevel& level, int first, int last, float* 
               static_cast<float>(y) + round_to_whole(clamp(load(level.v.row(y) + x), -bottom, bottom));
           const V at_x = clamp(target_x, 0, right);
           const V at_y = clamp(target_y, 0, bottom);
-          const I seen = I(at_x == target_x) & I(at_y == target_y);
+          I seen = I(at_x == target_x) & I(at_y == target_y);
+          if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
           const I at = truncate(at_y) * stride + truncate(at_x);
           const V du = at_x - here;
           const V dv = at_y - static_cast<float>(y);

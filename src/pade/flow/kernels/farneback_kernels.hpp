@@ -28,7 +28,8 @@ struct ExpansionFilters {
 struct FarnebackLevel {
   ExpansionView first;
   ExpansionView second;
-  PlaneView u;  ///< flow before the iteration, pixels
+  PlaneView mask;  ///< 0 = no data at this pixel of the first image; data null = all are used
+  PlaneView u;     ///< flow before the iteration, pixels
   PlaneView v;
   PlaneView next_u;  ///< and after it
   PlaneView next_v;

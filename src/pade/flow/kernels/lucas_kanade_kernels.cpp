@@ -11,6 +11,13 @@
 
 namespace pade::flow::PADE_ISA {
 
+namespace {
+// 1, or 0 where the mask leaves the pixel out.
+PADE_INLINE V weight(const LucasKanadeLevel& level, int x, int y) {
+  return level.mask.data == nullptr ? set(1.0F) : load(level.mask.row(y) + x);
+}
+}  // namespace
+
 long lucas_kanade_scratch(int radius, int width) { return window_scratch(3, radius, width); }
 
 void lucas_kanade_prepare(const LucasKanadeLevel& level, int first, int last, float* scratch) {
@@ -19,8 +26,9 @@ void lucas_kanade_prepare(const LucasKanadeLevel& level, int first, int last, fl
       first, last, level.first.width, level.first.height, level.taps, level.radius, scratch,
       [&](int y, float* const* out) {
         for (int x = 0; x < n; x += kLanes) {
-          const V gx = load(level.gradient_x.row(y) + x);
-          const V gy = load(level.gradient_y.row(y) + x);
+          const V used = weight(level, x, y);
+          const V gx = load(level.gradient_x.row(y) + x) * used;
+          const V gy = load(level.gradient_y.row(y) + x) * used;
           store(out[0] + x, gx * gx);
           store(out[1] + x, gx * gy);
           store(out[2] + x, gy * gy);
@@ -58,8 +66,9 @@ void lucas_kanade_iterate(const LucasKanadeLevel& level, int first, int last, fl
           const V inside_y = clamp(at_y, 0, bottom);
           const V difference = bilinear(level.second.data, level.second.stride, inside_x, inside_y) -
                                load(level.first.row(y) + x);
-          const V gx = load(level.gradient_x.row(y) + x);
-          const V gy = load(level.gradient_y.row(y) + x);
+          const V used = weight(level, x, y);
+          const V gx = load(level.gradient_x.row(y) + x) * used;
+          const V gy = load(level.gradient_y.row(y) + x) * used;
           // Where the flow leaves the image nothing was seen: the residual is that of the present flow, zero.
           const V seen = select(I(at_x == inside_x) & I(at_y == inside_y), difference, V{});
           const V target = gx * u + gy * v - seen;

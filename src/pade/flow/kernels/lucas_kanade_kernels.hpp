@@ -10,6 +10,7 @@ namespace pade::flow {
 struct LucasKanadeLevel {
   PlaneView first;
   PlaneView second;
+  PlaneView mask;        ///< 0 = no data at this pixel of `first`; data null = all are used
   PlaneView gradient_x;  ///< of `first`
   PlaneView gradient_y;
   PlaneView inverse_xx;  ///< inverse of the windowed structure tensor plus damping

@@ -1,23 +1,9 @@
 #include "pade/flow/kernels/pyramid_kernels.hpp"
 
-#include "pade/flow/kernels/vec.hpp"
+#include "pade/flow/kernels/lines.hpp"
 
 namespace pade::flow::PADE_ISA {
 namespace {
-
-int clamp_index(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
-
-// Repeats the first and last of `width` elements on both sides of `line`, which has kRowMultiple spare there.
-void repeat_edges(float* line, int width) {
-  for (int i = 1; i <= 8; ++i) line[-i] = line[0];
-  const int end = padded(width) + 8;
-  for (int i = width; i < end; ++i) line[i] = line[width - 1];
-}
-
-void copy_with_edges(const float* from, float* line, int width) {
-  for (int x = 0; x < padded(width); x += kLanes) store(line + x, load(from + x));
-  repeat_edges(line, width);
-}
 
 PADE_INLINE void sort(V& a, V& b) {
   const V low = min(a, b);
@@ -102,7 +88,7 @@ void downsample(PlaneView from, PlaneView to, int first, int last, float* scratc
                           (load(rows[1] + x) + load(rows[3] + x)) * (4.0F / 16) +
                           load(rows[2] + x) * (6.0F / 16));
     }
-    repeat_edges(line, from.width);
+    repeat_edges(line, from.width, kLargestSmoothRadius);
     float* out = to.row(y);
     for (int x = 0; x < to.width; ++x) {
       const float* at = line + 2 * x;
@@ -137,30 +123,34 @@ void upsample(PlaneView from, PlaneView to, float factor, int first, int last) {
 void smooth(PlaneView from, PlaneView to, const float* taps, int radius, int first, int last,
             float* scratch) {
   float* line = scratch + kRowMultiple;
-  const float* pointers[17];
+  const float* pointers[2 * kLargestSmoothRadius + 1];
   for (int y = first; y < last; ++y) {
     for (int i = -radius; i <= radius; ++i) pointers[i + radius] = from.row(clamp_index(y + i, from.height));
     convolve_vertical(pointers + radius, taps, radius, line, padded(from.width));
-    repeat_edges(line, from.width);
+    repeat_edges(line, from.width, kLargestSmoothRadius);
     for (int x = 0; x < padded(from.width); x += kLanes) {
       store(to.row(y) + x, convolve_horizontal(line + x, taps, radius));
     }
   }
 }
 
-void gradient(PlaneView from, PlaneView along_x, PlaneView along_y, int first, int last, float* scratch) {
-  constexpr float kNear = 8.0F / 12;
-  constexpr float kFar = 1.0F / 12;
-  float* line = scratch + kRowMultiple;
+void subtract_from(PlaneView from, PlaneView to, int first, int last) {
   for (int y = first; y < last; ++y) {
-    copy_with_edges(from.row(y), line, from.width);
-    const float* rows[5];
-    for (int i = 0; i < 5; ++i) rows[i] = from.row(clamp_index(y + i - 2, from.height));
+    float* row = to.row(y);
+    for (int x = 0; x < padded(to.width); x += kLanes) store(row + x, load(from.row(y) + x) - load(row + x));
+    for (int x = to.width; x < padded(to.width); ++x) row[x] = row[to.width - 1];
+  }
+}
+
+void gradient(PlaneView from, PlaneView gradient_x, PlaneView gradient_y, int first, int last,
+              float* scratch) {
+  Lines<5> lines(from, scratch, first - 2);
+  for (int y = first; y < last; ++y) {
+    lines.advance(y + 2);
     for (int x = 0; x < padded(from.width); x += kLanes) {
-      store(along_x.row(y) + x, (load(line + x + 1) - load(line + x - 1)) * kNear -
-                                    (load(line + x + 2) - load(line + x - 2)) * kFar);
-      store(along_y.row(y) + x,
-            (load(rows[3] + x) - load(rows[1] + x)) * kNear - (load(rows[4] + x) - load(rows[0] + x)) * kFar);
+      store(gradient_x.row(y) + x, along_x(lines[y] + x));
+      store(gradient_y.row(y) + x, five_point(load(lines[y - 2] + x), load(lines[y - 1] + x),
+                                              load(lines[y + 1] + x), load(lines[y + 2] + x)));
     }
   }
 }
@@ -184,9 +174,9 @@ void median3(PlaneView from, PlaneView to, int first, int last, float* scratch) 
       store(middle + x, b);
       store(high + x, c);
     }
-    repeat_edges(low, from.width);
-    repeat_edges(middle, from.width);
-    repeat_edges(high, from.width);
+    repeat_edges(low, from.width, kLargestSmoothRadius);
+    repeat_edges(middle, from.width, kLargestSmoothRadius);
+    repeat_edges(high, from.width, kLargestSmoothRadius);
     for (int x = 0; x < padded(from.width); x += kLanes) {
       const V largest_low = max(max(load(low + x - 1), load(low + x)), load(low + x + 1));
       const V smallest_high = min(min(load(high + x - 1), load(high + x)), load(high + x + 1));
@@ -221,7 +211,7 @@ void median5(PlaneView from, PlaneView to, int first, int last, float* scratch) 
       store(sorted[3] + x, p[3]);
       store(sorted[4] + x, p[4]);
     }
-    for (float* row : sorted) repeat_edges(row, from.width);
+    for (float* row : sorted) repeat_edges(row, from.width, kLargestSmoothRadius);
     for (int x = 0; x < padded(from.width); x += kLanes) {
       // Rank i of the columns, sorted across the five columns: q[i][j] then has at least (i+1)(j+1)-1 of the
       // 25 values below it and (5-i)(5-j)-1 above. The median has 12 on each side, which leaves 13

@@ -18,13 +18,18 @@ PADE_DECLARE_KERNEL(void downsample(PlaneView from, PlaneView to, int first, int
 /// Twice the size: bilinear, times `factor`. Rows [first, last) of `to`.
 PADE_DECLARE_KERNEL(void upsample(PlaneView from, PlaneView to, float factor, int first, int last))
 
-/// Separable symmetric filter, edges repeated; taps[0] is the middle. Rows [first, last). `scratch`:
-/// padded(width) + 2 kRowMultiple floats. `from` and `to` differ.
+inline constexpr int kLargestSmoothRadius = 8;
+
+/// Separable symmetric filter of radius kLargestSmoothRadius at most, edges repeated; taps[0] is the middle.
+/// Rows [first, last). `scratch`: padded(width) + 2 kRowMultiple floats. `from` and `to` differ.
 PADE_DECLARE_KERNEL(void smooth(PlaneView from, PlaneView to, const float* taps, int radius, int first,
                                 int last, float* scratch))
 
+/// to = from - to, in rows [first, last); the last pixel of each row is repeated behind its end.
+PADE_DECLARE_KERNEL(void subtract_from(PlaneView from, PlaneView to, int first, int last))
+
 /// Derivatives along x and y by [1 -8 0 8 -1] / 12, edges repeated. Rows [first, last). `scratch`:
-/// padded(width) + 2 kRowMultiple floats.
+/// 5 (padded(width) + 2 kRowMultiple) floats.
 PADE_DECLARE_KERNEL(void gradient(PlaneView from, PlaneView along_x, PlaneView along_y, int first, int last,
                                   float* scratch))
 
