@@ -68,11 +68,14 @@ KernelParameters kernel_parameters(const DepthInput& input, const DepthOptions& 
   for (int i = 0; i < 3; ++i) k.omega[i] = static_cast<float>(omega[i]);
   k.add_tz = options.model == Model::exact ? k.tz : 0.0F;
   k.sigma2 = static_cast<float>(sigma * sigma);
-  k.parallax2 = static_cast<float>(options.parallax_gate * options.parallax_gate);
-  k.residual2 = static_cast<float>(options.residual_gate * options.residual_gate);
+  const bool gates = options.gates == Gates::on;
+  k.parallax2 = gates ? static_cast<float>(options.parallax_gate * options.parallax_gate) : 0.0F;
+  k.residual2 = gates ? static_cast<float>(options.residual_gate * options.residual_gate)
+                      : std::numeric_limits<float>::infinity();
   k.tangent2 = static_cast<float>(std::pow(std::tan(options.residual_angle), 2));
   // |a| at which a thing at depth Z has just enough parallax.
-  const auto needed = [&](double Z) { return options.parallax_gate * sigma * std::max(Z - t.z(), 0.1 * Z); };
+  const double least = gates ? options.parallax_gate * sigma : sigma;
+  const auto needed = [&](double Z) { return least * std::max(Z - t.z(), 0.1 * Z); };
   const double cone = kEpipoleCone * std::max(camera.fx, camera.fy) * t.norm();
   k.blind2 = static_cast<float>(std::pow(needed(options.nearest), 2));
   k.epipole2 = static_cast<float>(std::pow(std::min(needed(options.far), cone), 2));
@@ -192,8 +195,8 @@ void DepthEstimator::make_gate(const DepthInput& input) {
       options_.texture_gate > 0 && !input.reference.empty() && size.width >= 3 && size.height >= 3;
   if (judge) {
     diagnostics_.image_noise = image_noise(input.reference, input.other, input.flow);
-    gate_ = texture_gate(structure_tensor(input.reference), input.camera, input.motion, options_.texture_gate,
-                         diagnostics_.image_noise, size);
+    gate_ = texture_gate(input.reference, input.other, input.flow, input.camera, input.motion,
+                         {options_.texture_gate, options_.texture_correlation}, diagnostics_.image_noise);
   } else if (gate_.size() != size || cv::countNonZero(gate_) > 0) {
     gate_ = cv::Mat::zeros(size, CV_8UC1);
   }

@@ -29,12 +29,20 @@ enum class Derotation {
   flow,   ///< the flow is corrected after matching
 };
 
-/// Options of estimate_depth().
+/// Which pixels with a positive depth are published.
+enum class Gates {
+  on,   ///< those that the image and the geometry support; the rest gets its state
+  off,  ///< all of them but at the epipole: dense, for comparison with methods that do not know what they do
+        ///< not know
+};
+
+/// Options of DepthEstimator.
 struct DepthOptions {
   Method method = Method::pade;
   Model model = Model::exact;
   Reading reading = Reading::least_squares;
   int window = 1;
+  Gates gates = Gates::on;
   double range = 20;
   double flow_sigma = 0;
   double nearest = 1;
@@ -43,6 +51,7 @@ struct DepthOptions {
   double residual_gate = 5;
   double residual_angle = 0.25;
   double texture_gate = 3;
+  double texture_correlation = 0.3;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -50,6 +59,7 @@ struct DepthOptions {
     field("model", self.model, "exact | instantaneous motion model");
     field("reading", self.reading, "least-squares | samelson reading of Eq. 2");
     field("window", self.window, "n of the n x n windows over which flow is averaged; 1 = every pixel");
+    field("gates", self.gates, "on | off: whether doubtful pixels are left out");
     field("range", self.range, "farthest depth that is published, m");
     field("flow_sigma", self.flow_sigma,
           "standard deviation of each flow component, px; 0 = from the flow across the epipolar lines");
@@ -86,6 +96,11 @@ struct pade::EnumNames<pade::depth::Reading> {
   static constexpr std::array names = {
       std::pair{depth::Reading::least_squares, std::string_view("least-squares")},
       std::pair{depth::Reading::samelson, std::string_view("samelson")}};
+};
+template <>
+struct pade::EnumNames<pade::depth::Gates> {
+  static constexpr std::array names = {std::pair{depth::Gates::on, std::string_view("on")},
+                                       std::pair{depth::Gates::off, std::string_view("off")}};
 };
 template <>
 struct pade::EnumNames<pade::depth::Derotation> {

@@ -17,42 +17,100 @@ constexpr double kSobelNoise =
     0.433012701892219;  // sqrt(12) / 8: gradient noise per grey level of image noise
 constexpr double kRoundingNoise = 0.288675134594813;  // 1 / sqrt(12) grey levels
 constexpr double kMedianToSigma = 1.4826;             // of a normal distribution
-}  // namespace
 
-StructureTensor structure_tensor(const cv::Mat& image) {
-  cv::Mat gx;
-  cv::Mat gy;
-  cv::spatialGradient(image, gx, gy, 3, cv::BORDER_REPLICATE);
+struct Gradients {
+  explicit Gradients(const cv::Mat& image) { cv::spatialGradient(image, x, y, 3, cv::BORDER_REPLICATE); }
+  /// Along the unit vector e, kSobelSum times grey levels per pixel.
+  [[nodiscard]] float along(const cv::Vec2f& e, int v, int u) const {
+    return e[0] * static_cast<float>(x.at<std::int16_t>(v, u)) + e[1] * static_cast<float>(y.at<std::int16_t>(v, u));
+  }
+  cv::Mat x, y;  // CV_16SC1
+};
+
+/// Mean of (gradient along the epipolar line)^2 per block, each averaged with its eight neighbours.
+cv::Mat energy_along(const Gradients& image, const cv::Mat& directions) {
   const auto accumulate = PADE_DISPATCH(accumulate_gradients, simd::best());
-
-  const int rows = (image.rows + kTextureBlock - 1) / kTextureBlock;
-  const int columns = (image.cols + kTextureBlock - 1) / kTextureBlock;
-  cv::Mat sums[3];
-  for (cv::Mat& sum : sums) sum.create(rows, columns, CV_32FC1);
-  const auto width = static_cast<std::size_t>(image.cols);
-  std::vector<std::int32_t> column_sums(3 * width);
-  for (int r = 0; r < rows; ++r) {
-    std::fill(column_sums.begin(), column_sums.end(), 0);
-    const int last = std::min(image.rows, (r + 1) * kTextureBlock);
-    for (int v = r * kTextureBlock; v < last; ++v) {
-      accumulate(gx.ptr<std::int16_t>(v), gy.ptr<std::int16_t>(v), width, column_sums.data(),
-                 column_sums.data() + width, column_sums.data() + 2 * width);
+  const auto width = static_cast<std::size_t>(image.x.cols);
+  std::vector<std::int32_t> columns(3 * width);
+  cv::Mat energy(directions.size(), CV_32FC1);
+  for (int r = 0; r < energy.rows; ++r) {
+    std::fill(columns.begin(), columns.end(), 0);
+    const int bottom = std::min(image.x.rows, (r + 1) * kTextureBlock);
+    for (int v = r * kTextureBlock; v < bottom; ++v) {
+      accumulate(image.x.ptr<std::int16_t>(v), image.y.ptr<std::int16_t>(v), width, columns.data(),
+                 columns.data() + width, columns.data() + 2 * width);
     }
-    for (int c = 0; c < columns; ++c) {
-      const int end = std::min(image.cols, (c + 1) * kTextureBlock);
-      const int pixels = (last - r * kTextureBlock) * (end - c * kTextureBlock);
-      for (std::size_t k = 0; k < 3; ++k) {
-        std::int64_t sum = 0;
-        for (int u = c * kTextureBlock; u < end; ++u)
-          sum += column_sums[k * width + static_cast<std::size_t>(u)];
-        sums[k].at<float>(r, c) =
-            static_cast<float>(static_cast<double>(sum) / (kSobelSum * kSobelSum * pixels));
+    for (int c = 0; c < energy.cols; ++c) {
+      const int right = std::min(image.x.cols, (c + 1) * kTextureBlock);
+      float xx = 0;
+      float xy = 0;
+      float yy = 0;
+      for (auto u = static_cast<std::size_t>(c * kTextureBlock); u < static_cast<std::size_t>(right); ++u) {
+        xx += static_cast<float>(columns[u]);
+        xy += static_cast<float>(columns[width + u]);
+        yy += static_cast<float>(columns[2 * width + u]);
       }
+      const int pixels = (bottom - r * kTextureBlock) * (right - c * kTextureBlock);
+      const auto& e = directions.at<cv::Vec2f>(r, c);
+      energy.at<float>(r, c) =
+          (e[0] * e[0] * xx + 2 * e[0] * e[1] * xy + e[1] * e[1] * yy) / static_cast<float>(pixels);
     }
   }
-  for (cv::Mat& sum : sums) cv::blur(sum, sum, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
-  return {sums[0], sums[1], sums[2]};
+  cv::blur(energy, energy, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
+  return energy;
 }
+
+/// Unit vector along the epipolar line at the centre of each block: CV_32FC2.
+cv::Mat epipolar_directions(const Camera& camera, const RelativeMotion& motion, cv::Size blocks) {
+  cv::Mat directions(blocks, CV_32FC2);
+  for (int r = 0; r < blocks.height; ++r) {
+    for (int c = 0; c < blocks.width; ++c) {
+      const Eigen::Vector2d p(cell_centre(c, kTextureBlock) - camera.cx,
+                              cell_centre(r, kTextureBlock) - camera.cy);
+      const Eigen::Vector2f e = times_A(camera, p, motion.t_reference_other).normalized().cast<float>();
+      directions.at<cv::Vec2f>(r, c) = {e.x(), e.y()};
+    }
+  }
+  return directions;
+}
+
+/// 1, a, b, aa, bb, ab over the matched pixels of a block: a and b are the gradients along the epipolar line
+/// of the two images at matching places.
+cv::Vec6f block_sums(const Gradients& first, const Gradients& second, const FlowField& flow, int r, int c,
+                     const cv::Vec2f& e) {
+  cv::Vec6f sum = cv::Vec6f::all(0);
+  const int bottom = std::min(first.x.rows, (r + 1) * kTextureBlock);
+  const int right = std::min(first.x.cols, (c + 1) * kTextureBlock);
+  for (int v = r * kTextureBlock; v < bottom; ++v) {
+    const auto* w = flow.vectors.ptr<cv::Vec2f>(v);
+    for (int u = c * kTextureBlock; u < right; ++u) {
+      const float x = static_cast<float>(u) + w[u][0] + 0.5F;
+      const float y = static_cast<float>(v) + w[u][1] + 0.5F;
+      const bool inside = x >= 0 && y >= 0 && x < static_cast<float>(second.x.cols) &&
+                          y < static_cast<float>(second.x.rows);  // false for NaN
+      if (!inside) continue;
+      const float a = first.along(e, v, u);
+      const float b = second.along(e, static_cast<int>(y), static_cast<int>(x));
+      sum += cv::Vec6f(1, a, b, a * a, b * b, a * b);
+    }
+  }
+  return sum;
+}
+
+/// Correlation of a and b; 0 where either does not vary beyond rounding or little was matched.
+float correlation(const cv::Vec6f& mean) {
+  const float n = mean[0];
+  if (!(n >= 0.25F * kTextureBlock * kTextureBlock)) return 0;
+  const float aa = mean[3] - mean[1] * mean[1] / n;
+  const float bb = mean[4] - mean[2] * mean[2] / n;
+  const float ab = mean[5] - mean[1] * mean[2] / n;
+  constexpr float kRounding =
+      2;  // summed squares of kSobelSum times the gradient: a step of one level here and there
+  if (!(aa > kRounding * n) || !(bb > kRounding * n)) return 0;
+  return ab / std::sqrt(aa * bb);
+}
+
+}  // namespace
 
 double image_noise(const cv::Mat& first, const cv::Mat& second, const FlowField& flow) {
   constexpr int kStep = 4;
@@ -100,29 +158,46 @@ double image_noise(const cv::Mat& first, const cv::Mat& second, const FlowField&
   return std::max(kRoundingNoise, kMedianToSigma / std::sqrt(2.0) * static_cast<double>(*middle));
 }
 
-cv::Mat texture_gate(const StructureTensor& tensor, const Camera& camera, const RelativeMotion& motion,
-                     double gate, double noise, cv::Size size) {
-  const double weakest = std::pow(gate * kSobelNoise * noise, 2);
-  cv::Mat out(size, CV_8UC1);
-  std::vector<std::uint8_t> row(static_cast<std::size_t>(tensor.xx.cols));
-  for (int r = 0; r < tensor.xx.rows; ++r) {
-    for (int c = 0; c < tensor.xx.cols; ++c) {
-      const Eigen::Vector2d p(cell_centre(c, kTextureBlock) - camera.cx,
-                              cell_centre(r, kTextureBlock) - camera.cy);
-      const Eigen::Vector2d a = times_A(camera, p, motion.t_reference_other);
-      const double along = a.x() * a.x() * tensor.xx.at<float>(r, c) +
-                           2 * a.x() * a.y() * tensor.xy.at<float>(r, c) +
-                           a.y() * a.y() * tensor.yy.at<float>(r, c);
-      row[static_cast<std::size_t>(c)] =
-          along >= weakest * a.squaredNorm() ? 0 : static_cast<std::uint8_t>(DepthState::no_texture);
+cv::Mat texture_gate(const cv::Mat& reference, const cv::Mat& other, const FlowField& flow,
+                     const Camera& camera, const RelativeMotion& motion, const TextureLimits& limits,
+                     double noise) {
+  const Gradients first(reference);
+  const cv::Size blocks((reference.cols + kTextureBlock - 1) / kTextureBlock,
+                        (reference.rows + kTextureBlock - 1) / kTextureBlock);
+  const cv::Mat directions = epipolar_directions(camera, motion, blocks);
+  const cv::Mat weak =
+      energy_along(first, directions) < std::pow(limits.strong * kSobelSum * kSobelNoise * noise, 2);
+
+  // Only weak blocks need a second look; their windows reach into the blocks around them.
+  cv::Mat sums(blocks, CV_32FC(6), cv::Scalar::all(0));
+  if (cv::countNonZero(weak) > 0) {
+    const Gradients second(other);
+    cv::Mat around;
+    cv::dilate(weak, around, cv::Mat());
+    for (int r = 0; r < blocks.height; ++r) {
+      for (int c = 0; c < blocks.width; ++c) {
+        if (around.at<std::uint8_t>(r, c) == 0) continue;
+        sums.at<cv::Vec6f>(r, c) = block_sums(first, second, flow, r, c, directions.at<cv::Vec2f>(r, c));
+      }
     }
-    auto* first = out.ptr<std::uint8_t>(r * kTextureBlock);
-    for (int u = 0; u < size.width; ++u) first[u] = row[static_cast<std::size_t>(u / kTextureBlock)];
-    for (int v = r * kTextureBlock + 1; v < std::min(size.height, (r + 1) * kTextureBlock); ++v) {
-      std::copy_n(first, size.width, out.ptr<std::uint8_t>(v));
+    cv::blur(sums, sums, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
+  }
+
+  cv::Mat gate(reference.size(), CV_8UC1);
+  std::vector<std::uint8_t> row(static_cast<std::size_t>(blocks.width));
+  for (int r = 0; r < blocks.height; ++r) {
+    for (int c = 0; c < blocks.width; ++c) {
+      const bool texture = weak.at<std::uint8_t>(r, c) == 0 ||
+                           correlation(sums.at<cv::Vec6f>(r, c)) >= static_cast<float>(limits.correlation);
+      row[static_cast<std::size_t>(c)] = texture ? 0 : static_cast<std::uint8_t>(DepthState::no_texture);
+    }
+    auto* top = gate.ptr<std::uint8_t>(r * kTextureBlock);
+    for (int u = 0; u < gate.cols; ++u) top[u] = row[static_cast<std::size_t>(u / kTextureBlock)];
+    for (int v = r * kTextureBlock + 1; v < std::min(gate.rows, (r + 1) * kTextureBlock); ++v) {
+      std::copy_n(top, gate.cols, gate.ptr<std::uint8_t>(v));
     }
   }
-  return out;
+  return gate;
 }
 
 }  // namespace pade::depth

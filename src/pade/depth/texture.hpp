@@ -9,15 +9,9 @@
 
 namespace pade::depth {
 
-/// Structure tensor of an image on blocks of kTextureBlock x kTextureBlock pixels, each averaged with its
-/// eight neighbours: what a flow method that looks at a neighbourhood of about a dozen pixels can see.
-struct StructureTensor {
-  cv::Mat xx, xy, yy;  ///< CV_32FC1, ceil(size / kTextureBlock), mean squared gradient, (grey levels / px)^2
-};
+/// Everything here is summed over blocks of this many pixels squared, and each block is judged together with
+/// its eight neighbours: what a flow method that looks at a neighbourhood of about a dozen pixels can see.
 inline constexpr int kTextureBlock = 4;
-
-/// Structure tensor of a CV_8UC1 image of at least 3 x 3 pixels from 3 x 3 Sobel gradients.
-StructureTensor structure_tensor(const cv::Mat& image);
 
 /// Standard deviation of the image noise, grey levels: median absolute difference between the images where
 /// the flow matches them, over the quarter of the pixels with the weakest gradient (their difference is
@@ -25,11 +19,21 @@ StructureTensor structure_tensor(const cv::Mat& image);
 /// matches.
 double image_noise(const cv::Mat& first, const cv::Mat& second, const FlowField& flow);
 
-/// Marks blocks whose gradient along the epipolar line (direction A t) is below `gate` times that of pure
-/// noise.
-/// @param noise  image_noise(). @param size  of the image.
-/// @return CV_8UC1 of `size`: 0 or DepthState::no_texture.
-cv::Mat texture_gate(const StructureTensor& tensor, const Camera& camera, const RelativeMotion& motion,
-                     double gate, double noise, cv::Size size);
+/// How blank an image must be to be no texture.
+struct TextureLimits {
+  double strong = 3;  ///< gradient along the epipolar line, in units of that of white noise: surely texture
+  double correlation =
+      0;  ///< weaker gradients are texture where both images show the same ones: at least this
+};
+
+/// Marks blocks that say nothing about motion along the epipolar line (direction A t): their gradient along
+/// it is not clearly above that of noise, and the gradients of the two matched images are not correlated
+/// either. Correlation is that of the deviations from the window's mean, so that shading, which looks the
+/// same everywhere, does not count.
+/// @param reference, other  CV_8UC1, one size, at least 3 x 3. @param flow  from reference to other.
+/// @param noise  image_noise(). @return CV_8UC1 of that size: 0 or DepthState::no_texture.
+cv::Mat texture_gate(const cv::Mat& reference, const cv::Mat& other, const FlowField& flow,
+                     const Camera& camera, const RelativeMotion& motion, const TextureLimits& limits,
+                     double noise);
 
 }  // namespace pade::depth
