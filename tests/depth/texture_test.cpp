@@ -38,7 +38,7 @@ RelativeMotion moving(const Eigen::Vector3d& t) {
 }
 
 const FlowField kStill{cv::Mat::zeros(kSize, CV_32FC2), {}};
-constexpr TextureLimits kLimits{3, 0.3};
+constexpr TextureLimits kLimits{3, 0.5};
 
 int blank_pixels(const cv::Mat& first, const cv::Mat& second, const Eigen::Vector3d& t) {
   const double noise = image_noise(first, second, kStill);
@@ -57,7 +57,7 @@ TEST(TextureGate, PureNoiseIsNoTextureWhateverItsStrength) {
   for (const double sigma : {0.0, 1.0, 4.0, 10.0}) {
     const cv::Mat first = noisy(blank, sigma, 1);
     const cv::Mat second = noisy(blank, sigma, 2);
-    EXPECT_NEAR(image_noise(first, second, kStill), std::max(0.29, sigma), 0.25 * sigma + 0.1);
+    EXPECT_NEAR(image_noise(first, second, kStill), std::max(0.5, sigma), 0.25 * sigma + 0.1);
     EXPECT_EQ(blank_pixels(first, second, {0.1, 0, 0}), kSize.area()) << sigma;
   }
 }
@@ -81,10 +81,10 @@ TEST(ImageNoise, IsNotChangedByExposureOrByTextureThatTheFlowMatches) {
   EXPECT_NEAR(image_noise(first, second, kStill), 2, 0.5);
 }
 
-TEST(ImageNoise, OfFlowThatMatchesNothingIsTheRoundingNoise) {
+TEST(ImageNoise, OfFlowThatMatchesNothingIsTheLeastNoise) {
   const FlowField away{cv::Mat(kSize, CV_32FC2, cv::Scalar(1e6, 0)), {}};
   const cv::Mat image = grating(kSize, 0.2, 0.13);
-  EXPECT_NEAR(image_noise(image, image, away), 0.2887, 1e-3);
+  EXPECT_NEAR(image_noise(image, image, away), 0.5, 1e-9);
 }
 
 }  // namespace

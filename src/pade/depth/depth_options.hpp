@@ -51,7 +51,7 @@ struct DepthOptions {
   double residual_gate = 5;
   double residual_angle = 0.25;
   double texture_gate = 3;
-  double texture_correlation = 0.3;
+  double texture_correlation = 0.5;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -72,9 +72,11 @@ struct DepthOptions {
         "flow by more than residual_angle");
     field("residual_angle", self.residual_angle,
           "largest angle between consistent flow and its epipolar line, rad (pose error turns all flow)");
-    field(
-        "texture_gate", self.texture_gate,
-        "gradient along the epipolar line below this many times that of image noise is no texture; 0 = off");
+    field("texture_gate", self.texture_gate,
+          "gradient along the epipolar line from this many times that of image noise on is texture; 0 = all "
+          "is");
+    field("texture_correlation", self.texture_correlation,
+          "weaker gradient is texture where those of the matched images correlate at least this much");
   }
 };
 

@@ -14,15 +14,16 @@ namespace pade::depth {
 namespace {
 constexpr double kSobelSum = 8;  // a unit ramp gives 8
 constexpr double kSobelNoise =
-    0.433012701892219;  // sqrt(12) / 8: gradient noise per grey level of image noise
-constexpr double kRoundingNoise = 0.288675134594813;  // 1 / sqrt(12) grey levels
-constexpr double kMedianToSigma = 1.4826;             // of a normal distribution
+    0.433012701892219;               // sqrt(12) / 8: gradient noise per grey level of image noise
+constexpr double kLeastNoise = 0.5;  // grey levels; rounding alone is 0.29, and its contours are no texture
+constexpr double kMedianToSigma = 1.4826;  // of a normal distribution
 
 struct Gradients {
   explicit Gradients(const cv::Mat& image) { cv::spatialGradient(image, x, y, 3, cv::BORDER_REPLICATE); }
   /// Along the unit vector e, kSobelSum times grey levels per pixel.
   [[nodiscard]] float along(const cv::Vec2f& e, int v, int u) const {
-    return e[0] * static_cast<float>(x.at<std::int16_t>(v, u)) + e[1] * static_cast<float>(y.at<std::int16_t>(v, u));
+    return e[0] * static_cast<float>(x.at<std::int16_t>(v, u)) +
+           e[1] * static_cast<float>(y.at<std::int16_t>(v, u));
   }
   cv::Mat x, y;  // CV_16SC1
 };
@@ -104,9 +105,8 @@ float correlation(const cv::Vec6f& mean) {
   const float aa = mean[3] - mean[1] * mean[1] / n;
   const float bb = mean[4] - mean[2] * mean[2] / n;
   const float ab = mean[5] - mean[1] * mean[2] / n;
-  constexpr float kRounding =
-      2;  // summed squares of kSobelSum times the gradient: a step of one level here and there
-  if (!(aa > kRounding * n) || !(bb > kRounding * n)) return 0;
+  constexpr float kContours = 8;  // (kSobelSum * 0.35 grey levels per px)^2: the contours of 8-bit shading
+  if (!(aa > kContours * n) || !(bb > kContours * n)) return 0;
   return ab / std::sqrt(aa * bb);
 }
 
@@ -143,7 +143,7 @@ double image_noise(const cv::Mat& first, const cv::Mat& second, const FlowField&
       samples.push_back({gradient, match - static_cast<float>(row[u])});
     }
   }
-  if (samples.size() < 16) return kRoundingNoise;
+  if (samples.size() < 16) return kLeastNoise;
   const auto quarter = samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 4);
   std::nth_element(samples.begin(), quarter, samples.end(),
                    [](const Sample& a, const Sample& b) { return a.gradient < b.gradient; });
@@ -155,7 +155,7 @@ double image_noise(const cv::Mat& first, const cv::Mat& second, const FlowField&
   const float offset = *middle;  // a change of exposure is not noise
   for (float& difference : differences) difference = std::abs(difference - offset);
   std::nth_element(differences.begin(), middle, differences.end());
-  return std::max(kRoundingNoise, kMedianToSigma / std::sqrt(2.0) * static_cast<double>(*middle));
+  return std::max(kLeastNoise, kMedianToSigma / std::sqrt(2.0) * static_cast<double>(*middle));
 }
 
 cv::Mat texture_gate(const cv::Mat& reference, const cv::Mat& other, const FlowField& flow,

@@ -15,8 +15,8 @@ inline constexpr int kTextureBlock = 4;
 
 /// Standard deviation of the image noise, grey levels: median absolute difference between the images where
 /// the flow matches them, over the quarter of the pixels with the weakest gradient (their difference is
-/// noise, not flow error). At least the noise of rounding to 8 bits. @return that minimum where nothing
-/// matches.
+/// noise, not flow error). At least 0.5, a little above the noise of rounding to 8 bits. @return that minimum
+/// where nothing matches.
 double image_noise(const cv::Mat& first, const cv::Mat& second, const FlowField& flow);
 
 /// How blank an image must be to be no texture.
