@@ -70,16 +70,19 @@ Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const Obstac
   if (const Status status = check(camera, options, valid); !status) return status.error();
   auto flow = flow::make_flow_estimator(options.flow);
   if (!flow) return flow.error();
-  return ObstacleMapper(camera, options, valid, std::move(flow).value());
+  auto map = mapping::OccupancyMap::create(options.map);
+  if (!map) return map.error();
+  return ObstacleMapper(camera, options, valid, std::move(flow).value(), std::move(map).value());
 }
 
-ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options,
-                               const cv::Mat& valid, std::unique_ptr<flow::FlowEstimator> flow)
+ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid,
+                               std::unique_ptr<flow::FlowEstimator> flow, mapping::OccupancyMap map)
     : camera_(camera),
       options_(options),
       valid_(valid.clone()),
       flow_(std::move(flow)),
-      depth_(options.depth) {
+      depth_(options.depth),
+      map_(std::move(map)) {
   if (!valid_.empty() && cv::countNonZero(valid_ == 0) == 0) valid_.release();
 }
 
@@ -158,6 +161,8 @@ void ObstacleMapper::map_pair(const Frame& reference, const Frame& other) {
   update_.reference = reference;
 
   // Back-project and update the occupancy map (Section 4.2).
+  const Stopwatch watch(update_, Stage::map);
+  update_.change = map_.integrate(update_.depth, camera_, reference.T_world_camera);
 }
 
 }  // namespace pade

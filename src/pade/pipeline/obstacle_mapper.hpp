@@ -21,6 +21,7 @@
 #include "pade/depth/depth_estimator.hpp"
 #include "pade/depth/depth_options.hpp"
 #include "pade/flow/flow_estimator.hpp"
+#include "pade/mapping/occupancy_map.hpp"
 
 namespace pade {
 
@@ -35,8 +36,8 @@ struct ObstacleMapperOptions {
   depth::Derotation derotation = depth::Derotation::image;
   Order order = Order::newest;
   int step = 1;
-  bool map = true;
   depth::DepthOptions depth;
+  mapping::MapOptions map;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -44,8 +45,8 @@ struct ObstacleMapperOptions {
     field("derotate", self.derotation, "image | flow: where rotation is removed");
     field("order", self.order, "newest | first: the frame of a pair on whose pixels the depth lives");
     field("step", self.step, "pairs each frame with the step-th before it");
-    field("map", self.map, "whether depth is fused into the occupancy map");
     field("depth", self.depth, "depth from motion");
+    field("map", self.map, "occupancy map");
   }
 };
 
@@ -68,6 +69,7 @@ struct MapperUpdate {
   FlowField flow;         ///< from the reference to the other image (derotated where derotate = image)
   DepthImage depth;
   depth::DepthDiagnostics diagnostics;
+  mapping::MapChange change;  ///< what the depth image changed in the map
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
 };
 
@@ -97,10 +99,11 @@ class ObstacleMapper {
   [[nodiscard]] const ObstacleMapperOptions& options() const { return options_; }
   [[nodiscard]] const Camera& camera() const { return camera_; }
   [[nodiscard]] const MapperHealth& health() const { return health_; }
+  [[nodiscard]] const mapping::OccupancyMap& map() const { return map_; }
 
  private:
   ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid,
-                 std::unique_ptr<flow::FlowEstimator> flow);
+                 std::unique_ptr<flow::FlowEstimator> flow, mapping::OccupancyMap map);
   [[nodiscard]] std::string reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const;
   void map_pair(const Frame& reference, const Frame& other);
 
@@ -109,6 +112,7 @@ class ObstacleMapper {
   cv::Mat valid_;
   std::unique_ptr<flow::FlowEstimator> flow_;
   depth::DepthEstimator depth_;
+  mapping::OccupancyMap map_;
   std::deque<Frame> recent_;  // the last step frames, grey, oldest first
   MapperUpdate update_;
   MapperHealth health_;

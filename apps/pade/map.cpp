@@ -1,0 +1,216 @@
+// `pade map`: a recorded flight in, depth and an obstacle map out.
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <opencv2/core/utility.hpp>
+
+#include "pade/evaluation/accuracy_tables.hpp"
+#include "pade/flow/flow_estimator.hpp"
+#include "pade/io/atomic_output.hpp"
+#include "pade/io/options_json.hpp"
+#include "pade/pipeline/map_sequence.hpp"
+
+#include "commands.hpp"
+#include "enum_option.hpp"
+#include "progress.hpp"
+
+namespace pade::cli {
+namespace {
+
+struct MapArguments {
+  std::string sequence;
+  std::string out;
+  std::string config;
+  std::string save;
+  bool paper = false;
+  bool force = false;
+  bool strict = false;
+  bool json = false;
+  bool pcd = false;
+  bool no_report = false;
+  int threads = 1;
+
+  std::optional<std::string> flow, poses, calibration, world_up;
+  std::optional<depth::Method> method;
+  std::optional<depth::Model> model;
+  std::optional<depth::Reading> reading;
+  std::optional<depth::Derotation> derotate;
+  std::optional<depth::Gates> gates;
+  std::optional<Order> order;
+  std::optional<int> window, step;
+  std::optional<double> range, voxel, map_range;
+};
+
+template <class T>
+void set(T& field, const std::optional<T>& given) {
+  if (given) field = *given;
+}
+
+/// The paper as it is printed: "literal PADE" of docs/method.md.
+void as_printed(ObstacleMapperOptions& mapper) {
+  mapper.depth.model = depth::Model::instantaneous;
+  mapper.depth.reading = depth::Reading::samelson;
+  mapper.derotation = depth::Derotation::flow;
+  mapper.order = Order::first;
+  mapper.depth.window = 4;
+}
+
+/// Defaults, then --paper, then the file of --config, then the single options.
+Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
+  MapSequenceOptions options;
+  if (arguments.paper) as_printed(options.mapper);
+  if (!arguments.config.empty()) {
+    const auto text = io::read_file(arguments.config);
+    if (!text) return text.error();
+    if (Status status = io::from_yaml(*text, arguments.config, options); !status) return status.error();
+  }
+  ObstacleMapperOptions& mapper = options.mapper;
+  set(mapper.flow, arguments.flow);
+  set(mapper.depth.method, arguments.method);
+  set(mapper.depth.model, arguments.model);
+  set(mapper.depth.reading, arguments.reading);
+  set(mapper.depth.gates, arguments.gates);
+  set(mapper.depth.window, arguments.window);
+  set(mapper.depth.range, arguments.range);
+  set(mapper.derotation, arguments.derotate);
+  set(mapper.order, arguments.order);
+  set(mapper.step, arguments.step);
+  set(mapper.map.voxel, arguments.voxel);
+  set(mapper.map.range, arguments.map_range);
+  set(options.sequence.poses, arguments.poses);
+  set(options.sequence.calibration, arguments.calibration);
+  set(options.sequence.world_up, arguments.world_up);
+  options.sequence.strict = options.sequence.strict || arguments.strict;
+  options.pcd = options.pcd || arguments.pcd;
+  options.report = options.report && !arguments.no_report;
+  return options;
+}
+
+Result<MapResult> map(const MapArguments& arguments) {
+  const auto options = options_of(arguments);
+  if (!options) return options.error();
+  const auto stacks = io::ImageStacks::parse(arguments.save);
+  if (!stacks) return stacks.error();
+  const auto sequence = io::Sequence::open(arguments.sequence, options->sequence);
+  if (!sequence) return sequence.error();
+  io::RunWriterOptions output;
+  output.overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
+  output.save = *stacks;
+  output.image_size = sequence->camera().size();
+  output.range_limit = options->mapper.depth.range;
+  auto writer = io::RunWriter::create(arguments.out, output);
+  if (!writer) return writer.error();
+
+  Progress progress("Mapping", sequence->size());
+  return map_sequence(*sequence, *options, *writer, arguments.threads, [&](const MapProgress& now) {
+    progress.step(fmt::format("{} depth images, {} skipped", now.mapped, now.skipped));
+    return !io::interrupted();
+  });
+}
+
+void print_table(const MapArguments& arguments, const MapResult& result) {
+  const io::RunInfo& info = result.info;
+  fmt::print("{:14} {} of {} frames used, {} depth images, {} skipped\n", "Flight", info.health.frames_used,
+             info.health.frames, info.health.depth_images, info.health.skipped.size());
+  constexpr std::size_t kNamed = 5;
+  for (std::size_t i = 0; i < std::min(kNamed, info.health.skipped.size()); ++i) {
+    fmt::print("{:14} {}: {}\n", i == 0 ? "  skipped" : "", info.health.skipped[i].file, info.health.skipped[i].reason);
+  }
+  if (info.health.skipped.size() > kNamed) {
+    fmt::print("{:14} ... and {} more, in run.json\n", "", info.health.skipped.size() - kNamed);
+  }
+  for (const std::string& warning : info.health.warnings) fmt::print("{:14} {}\n", "  note", warning);
+  std::uint64_t cells = 0;
+  for (const std::uint64_t count : info.state_pixels) cells += count;
+  fmt::print("{:14}", "Pixels");
+  for (std::size_t s = 0; s < info.state_pixels.size(); ++s) {
+    const double share = cells > 0 ? static_cast<double>(info.state_pixels[s]) / static_cast<double>(cells) : 0;
+    fmt::print(" {:.1f} % {}{}", 100 * share, depth_state_names[s], s + 1 < info.state_pixels.size() ? "," : "\n");
+  }
+  if (info.map) {
+    fmt::print("{:14} {} occupied and {} free voxels of {} m\n", "Map", info.map->occupied_voxels,
+               info.map->free_voxels, info.map->voxel);
+  }
+  if (!result.timing.stages.empty()) {
+    const io::StageTiming& total = result.timing.stages.back();
+    fmt::print("{:14} {:.1f} frames/s; latency {:.1f} ms median, {:.1f} p99, {:.1f} max; peak memory {:.0f} MB\n", "Time",
+               result.timing.frames_per_second, total.p50, total.p99, total.max,
+               static_cast<double>(result.timing.peak_memory) / 1e6);
+  }
+  if (result.accuracy) fmt::print("\n{}", evaluation::to_table(*result.accuracy));
+  fmt::print("\nWritten to {}{}\n", arguments.out,
+             arguments.no_report ? "" : fmt::format("; look at {}/report.html", arguments.out));
+}
+
+void run(const MapArguments& arguments, Context& context) {
+  io::watch_for_interrupts();
+  cv::setNumThreads(1);  // one core, and the same bits everywhere
+  const auto result = map(arguments);
+  if (!result) {
+    fmt::print(stderr, "pade map: {}\n", result.error().message);
+    context.exit_code = io::interrupted() ? 130 : 1;
+    return;
+  }
+  if (arguments.json) {
+    fmt::print("{}\n", io::to_json(result->info));
+  } else {
+    print_table(arguments, *result);
+  }
+}
+
+void add_pipeline_options(CLI::App& map, MapArguments& a) {
+  std::vector<std::string> methods = flow::flow_estimator_names();
+  methods.emplace_back("dis");
+  map.add_option("--flow", a.flow, "optical-flow method; dis = dis-medium (the default)")->check(CLI::IsMember(methods));
+  add_enum(map, "--depth", a.method, "depth from the pose (pade, the default) or from time to collision (ttc)");
+  add_enum(map, "--model", a.model, "finite motion (exact, the default) or Eq. 1 of the paper (instantaneous)");
+  add_enum(map, "--reading", a.reading, "how Eq. 2 is inverted (default least-squares)");
+  add_enum(map, "--derotate", a.derotate, "remove rotation from the image before matching (default) or from the flow");
+  add_enum(map, "--order", a.order, "depth on the newest frame of a pair (default, no latency) or on the first");
+  add_enum(map, "--gates", a.gates, "off: publish every positive depth, however doubtful (default on)");
+  map.add_option("--window", a.window, "n: one depth per n x n pixels (default 1)")->check(CLI::Range(1, 1024));
+  map.add_option("--step", a.step, "pair each frame with the k-th before it (default 1)")->check(CLI::Range(1, 1000));
+  map.add_option("--range", a.range, "farthest depth that is published, m (default 20)")->check(CLI::PositiveNumber);
+  map.add_option("--voxel", a.voxel, "side of the map's voxels, m (default 0.1)")->check(CLI::PositiveNumber);
+  map.add_option("--map-range", a.map_range, "depth up to which the map is updated, m (default 20)")
+      ->check(CLI::PositiveNumber);
+  map.add_flag("--paper", a.paper,
+               "as the paper prints it: instantaneous, samelson, derotated flow, first frame, window 4");
+}
+
+}  // namespace
+
+void add_map(CLI::App& app, Context& context) {
+  auto a = std::make_shared<MapArguments>();
+  CLI::App* map = app.add_subcommand("map", "Map a recorded flight: depth images and an obstacle map.");
+  map->footer(
+      "SEQUENCE is a folder in the TUM RGB-D, EuRoC or KITTI odometry layout (docs/sequences.md).\n"
+      "The run folder holds map.bt and map.ot (octovis), cloud.ply, trajectory.txt, run.json, timing.json,\n"
+      "report.html and, where the flight has true depth, evaluation.json and .csv.\n"
+      "Examples:\n"
+      "  pade map flight --out run\n"
+      "  pade map flight --out run --flow dis-fast --range 40 --save depth,sigma,state\n"
+      "  pade map flight --out literal --paper");
+  map->add_option("sequence", a->sequence, "folder of the recorded flight")->required();
+  map->add_option("-o,--out", a->out, "folder of the run, made by this command")->required();
+  add_pipeline_options(*map, *a);
+  map->add_option("--poses", a->poses, "groundtruth (default), original, or a pose file (TUM)");
+  map->add_option("--calibration", a->calibration, "calibration file instead of the sequence's own");
+  map->add_option("--world-up", a->world_up, "axis of the pose world that points up: +x -x +y -y +z -z");
+  map->add_option("--save", a->save, "image stacks to write: any of depth,sigma,state,flow");
+  map->add_option("--config", a->config, "YAML file with options as run.json echoes them");
+  map->add_option("--threads", a->threads, "2 reads ahead; the result is the same")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  map->add_flag("--strict", a->strict, "refuse a recording with anything that would be skipped");
+  map->add_flag("--pcd", a->pcd, "also write cloud.pcd");
+  map->add_flag("--no-report", a->no_report, "do not write report.html");
+  map->add_flag("--force", a->force, "replace a run that is there already");
+  map->add_flag("--json", a->json, "print run.json instead of the table");
+  map->callback([a, &context] { run(*a, context); });
+}
+
+}  // namespace pade::cli

@@ -1,0 +1,221 @@
+#include "pade/pipeline/map_sequence.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <future>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "pade/core/version.hpp"
+#include "pade/evaluation/accuracy_tables.hpp"
+#include "pade/evaluation/report.hpp"
+#include "pade/io/cloud_files.hpp"
+#include "pade/io/options_json.hpp"
+#include "pade/mapping/map_files.hpp"
+
+namespace pade {
+namespace {
+
+constexpr std::size_t kReportFrames = 4;
+
+/// A frame as it comes from the disk, with its truth.
+struct Loaded {
+  Result<Frame> frame = Error{};
+  cv::Mat truth;  // empty where there is none
+};
+
+Loaded load(const io::Sequence& sequence, std::size_t i) {
+  Loaded loaded{sequence.frame(i), {}};
+  if (sequence.has_truth()) {
+    if (auto truth = sequence.truth(i)) loaded.truth = *truth;
+  }
+  return loaded;
+}
+
+/// Reads frames in order, with a second thread one frame ahead.
+class Reader {
+ public:
+  Reader(const io::Sequence& sequence, bool ahead) : sequence_(sequence), ahead_(ahead) { prefetch(0); }
+  Loaded next() {
+    Loaded loaded = pending_.valid() ? pending_.get() : load(sequence_, i_);
+    prefetch(++i_);
+    return loaded;
+  }
+
+ private:
+  void prefetch(std::size_t i) {
+    if (ahead_ && i < sequence_.size()) {
+      pending_ = std::async(std::launch::async, [this, i] { return load(sequence_, i); });
+    }
+  }
+  const io::Sequence& sequence_;
+  bool ahead_;
+  std::size_t i_ = 0;
+  std::future<Loaded> pending_;
+};
+
+/// Everything a run gathers while it goes.
+class Run {
+ public:
+  Run(const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer, ObstacleMapper mapper)
+      : sequence_(sequence),
+        options_(options),
+        writer_(writer),
+        mapper_(std::move(mapper)),
+        cloud_(options.cloud),
+        accuracy_(options.mapper.depth.range) {
+    const std::size_t pairs = sequence.size() - std::min(sequence.size(), step());
+    for (const std::size_t pair : evaluation::evenly_spread(pairs, kReportFrames)) {
+      shown_.push_back(sequence.time(options.mapper.order == Order::newest ? pair + step() : pair));
+    }
+  }
+
+  Status add(std::size_t i, Loaded loaded) {
+    if (!loaded.frame) {
+      undecodable_.push_back({sequence_.image_file(i).string(), loaded.frame.error().message});
+      return sequence_.check(undecodable_.size());
+    }
+    const Frame& frame = *loaded.frame;
+    writer_.add_pose(frame.time, frame.T_world_camera);
+    path_.push_back(frame.T_world_camera.translation);
+    truths_[frame.time] = std::move(loaded.truth);
+    while (truths_.size() > step() + 1) truths_.erase(truths_.begin());
+
+    const MapperUpdate& update = mapper_.add(frame.image, frame.time, frame.T_world_camera);
+    if (update.outcome == MapperUpdate::Outcome::skipped) {
+      undecodable_.push_back({sequence_.image_file(i).string(), update.reason});
+      return sequence_.check(undecodable_.size());
+    }
+    ++used_;
+    return update.outcome == MapperUpdate::Outcome::mapped ? take(update, frame.image) : Status();
+  }
+
+  [[nodiscard]] MapProgress progress(std::size_t done) const {
+    return {done, sequence_.size(), mapper_.health().mapped, sequence_.skipped().size() + undecodable_.size()};
+  }
+
+  Result<MapResult> finish(double seconds) {
+    MapResult result;
+    result.info = writer_.completed(info());
+    result.timing = timing(seconds);
+    if (!accuracy_.empty()) result.accuracy = accuracy_.result();
+    if (Status status = write(result); !status) return status.error();
+    if (Status status = writer_.finish(result.info, result.timing); !status) return status.error();
+    return result;
+  }
+
+ private:
+  [[nodiscard]] std::size_t step() const { return static_cast<std::size_t>(options_.mapper.step); }
+
+  Status take(const MapperUpdate& update, const cv::Mat& newest) {
+    for (std::size_t stage = 0; stage < stage_names.size(); ++stage) {
+      milliseconds_[stage].push_back(1e3 * update.seconds[stage]);
+    }
+    const Time time = update.depth.time;
+    const cv::Mat& image = options_.mapper.order == Order::newest ? newest : update.reference.image;
+    const cv::Mat& truth = truths_[time];
+    accuracy_.add(update.depth, truth);
+    cloud_.add(update.depth, sequence_.camera(), update.reference.T_world_camera, image);
+    if (options_.report && std::find(shown_.begin(), shown_.end(), time) != shown_.end()) {
+      frames_.push_back({to_string(time), image.clone(), update.flow.vectors.clone(),
+                         {time, update.depth.window, update.depth.depth.clone(), update.depth.variance.clone(),
+                          update.depth.state.clone()},
+                         truth.clone()});
+    }
+    return writer_.add(update.depth, update.flow);
+  }
+
+  [[nodiscard]] io::RunInfo info() const {
+    io::RunInfo info;
+    info.version = version;
+    info.sequence = std::filesystem::absolute(sequence_.folder()).lexically_normal();
+    info.poses = sequence_.pose_file().filename().string();
+    info.options = io::to_json(options_);
+    info.camera = sequence_.camera();
+    info.window = options_.mapper.depth.window;
+    info.range_limit = options_.mapper.depth.range;
+    info.health.frames = static_cast<int>(sequence_.listed_frames());
+    info.health.frames_used = static_cast<int>(used_);
+    info.health.depth_images = static_cast<int>(mapper_.health().mapped);
+    info.health.skipped = sequence_.skipped();
+    info.health.skipped.insert(info.health.skipped.end(), undecodable_.begin(), undecodable_.end());
+    info.health.warnings = sequence_.notes();
+    info.world_up = sequence_.world_up();
+    info.origin = sequence_.origin();
+    const auto counts = mapper_.map().counts();
+    info.map = io::MapSummary{options_.mapper.map.voxel, counts.occupied, counts.free};
+    return info;
+  }
+
+  [[nodiscard]] io::RunTiming timing(double seconds) const {
+    io::RunTiming timing;
+    for (std::size_t stage = 0; stage < stage_names.size(); ++stage) {
+      timing.stages.push_back(io::summarise(stage_names[stage], milliseconds_[stage]));
+    }
+    timing.frames_per_second = seconds > 0 ? static_cast<double>(used_) / seconds : 0;
+    timing.peak_memory = io::peak_memory();
+    return timing;
+  }
+
+  Status write(const MapResult& result) {
+    const std::string frame = "world frame of " + result.info.poses + " (metres)";
+    std::vector<std::pair<std::string, std::string>> files = {
+        {"cloud.ply", io::encode_ply(cloud_.cloud(), frame)},
+        {"map.bt", mapping::encode_map(mapper_.map(), mapping::MapFormat::bt)},
+        {"map.ot", mapping::encode_map(mapper_.map(), mapping::MapFormat::ot)},
+        {"map.json", mapping::encode_side_car(options_.mapper.map, result.info.origin)},
+    };
+    if (options_.pcd) files.emplace_back("cloud.pcd", io::encode_pcd(cloud_.cloud()));
+    if (result.accuracy) {
+      files.emplace_back("evaluation.json", evaluation::to_json(*result.accuracy));
+      files.emplace_back("evaluation.csv", evaluation::to_csv(*result.accuracy));
+    }
+    if (options_.report) files.emplace_back("report.html", report(result));
+    for (const auto& [name, content] : files) {
+      if (Status status = writer_.write(name, content); !status) return status;
+    }
+    return {};
+  }
+
+  std::string report(const MapResult& result) {
+    evaluation::Report report{result.info, result.timing, result.accuracy, std::move(frames_), {}, path_};
+    for (const mapping::MapCell& cell : mapper_.map().occupied()) report.occupied.push_back(cell.centre);
+    return evaluation::to_html(report);
+  }
+
+  const io::Sequence& sequence_;
+  const MapSequenceOptions& options_;
+  io::RunWriter& writer_;
+  ObstacleMapper mapper_;
+  mapping::CloudBuilder cloud_;
+  evaluation::Accumulator accuracy_;
+  std::vector<Time> shown_;                     // frames of the report
+  std::vector<evaluation::ReportFrame> frames_;
+  std::map<Time, cv::Mat> truths_;              // of the frames whose depth may still come
+  std::vector<io::Skipped> undecodable_;
+  std::vector<Eigen::Vector3d> path_;
+  std::array<std::vector<double>, stage_names.size()> milliseconds_;
+  std::size_t used_ = 0;
+};
+
+}  // namespace
+
+Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer,
+                               int threads, const std::function<bool(const MapProgress&)>& progress) {
+  auto mapper = ObstacleMapper::create(sequence.camera(), options.mapper, sequence.mask());
+  if (!mapper) return mapper.error();
+
+  const auto start = std::chrono::steady_clock::now();
+  Run run(sequence, options, writer, std::move(mapper).value());
+  Reader reader(sequence, threads > 1);
+  for (std::size_t i = 0; i < sequence.size(); ++i) {
+    if (Status status = run.add(i, reader.next()); !status) return status.error();
+    if (progress && !progress(run.progress(i + 1))) return io::interrupted_error();
+  }
+  return run.finish(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+}
+
+}  // namespace pade

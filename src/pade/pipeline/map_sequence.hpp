@@ -1,0 +1,54 @@
+// A recorded flight through the obstacle mapper into the folder of a run: what `pade map` does.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "pade/core/result.hpp"
+#include "pade/evaluation/depth_accuracy.hpp"
+#include "pade/io/run_info.hpp"
+#include "pade/io/run_writer.hpp"
+#include "pade/io/sequence.hpp"
+#include "pade/mapping/cloud_builder.hpp"
+#include "pade/pipeline/obstacle_mapper.hpp"
+
+namespace pade {
+
+/// How a sequence is mapped. Echoed whole into run.json.
+struct MapSequenceOptions {
+  ObstacleMapperOptions mapper;
+  io::SequenceOptions sequence;
+  mapping::CloudOptions cloud;
+  bool pcd = false;
+  bool report = true;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("mapper", self.mapper, "the pipeline");
+    field("sequence", self.sequence, "how the recording is read");
+    field("cloud", self.cloud, "the point cloud of the run");
+    field("pcd", self.pcd, "also writes cloud.pcd");
+    field("report", self.report, "writes report.html");
+  }
+};
+
+/// How far a run is.
+struct MapProgress {
+  std::size_t done = 0, total = 0;  ///< frames
+  std::size_t mapped = 0, skipped = 0;
+};
+
+/// What a run found out, beside what it wrote.
+struct MapResult {
+  io::RunInfo info;
+  io::RunTiming timing;
+  std::optional<evaluation::DepthAccuracy> accuracy;  ///< empty where the sequence has no truth
+};
+
+/// Maps a sequence and writes the run. Nothing is left behind where this fails or `progress` returns false.
+/// @param threads   1: everything on the calling thread. 2: the next frame is read ahead. Same bytes either way.
+/// @param progress  called after every frame; false stops the run with io::interrupted_error(). May be empty.
+Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer,
+                               int threads, const std::function<bool(const MapProgress&)>& progress = {});
+
+}  // namespace pade
