@@ -12,46 +12,14 @@
 #include "pade/simulation/analytic_flights.hpp"
 #include "pade/simulation/analytic_render.hpp"
 
+#include "mapping/flown_map.hpp"
+
 namespace pade::mapping {
 namespace {
 
 using Eigen::Vector3d;
 using simulation::AnalyticFlight;
 using simulation::make_analytic_flight;
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
-/// Exact depth with normal noise of standard deviation `relative` * Z that the variance states truly.
-DepthImage depth_image(const AnalyticFlight& flight, std::size_t frame, double relative = 0) {
-  DepthImage image;
-  image.time = flight.times[frame];
-  image.depth = simulation::exact_depth(flight.scene, flight.camera, flight.T_world_camera[frame], 2);
-  image.variance = cv::Mat(image.depth.size(), CV_32FC1, cv::Scalar(0));
-  image.state = cv::Mat(image.depth.size(), CV_8UC1, cv::Scalar(0));
-  std::mt19937_64 random(1000 + frame);
-  std::normal_distribution<double> normal;
-  for (int v = 0; v < image.depth.rows; ++v) {
-    for (int u = 0; u < image.depth.cols; ++u) {
-      auto& depth = image.depth.at<float>(v, u);
-      if (std::isnan(depth)) {
-        image.variance.at<float>(v, u) = kNaN;
-        image.state.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(DepthState::no_texture);
-        continue;
-      }
-      const double sigma = relative * depth;
-      image.variance.at<float>(v, u) = static_cast<float>(sigma * sigma);
-      if (relative > 0) depth = static_cast<float>(depth + sigma * normal(random));
-    }
-  }
-  return image;
-}
-
-OccupancyMap map_of(const AnalyticFlight& flight, double relative, const MapOptions& options) {
-  OccupancyMap map = std::move(OccupancyMap::create(options)).value();
-  for (std::size_t k = 0; k < flight.times.size(); ++k) {
-    map.integrate(depth_image(flight, k, relative), flight.camera, flight.T_world_camera[k]);
-  }
-  return map;
-}
 
 struct Quality {
   double farthest_occupied = 0;  // distance of occupied voxel centres from the nearest surface, largest, m

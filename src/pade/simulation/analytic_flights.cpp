@@ -54,7 +54,7 @@ AnalyticScene street() {
 void add_building(AnalyticScene& scene) {
   Material wall = plain(0.62, 21, 0.24, 1.6);
   wall.pane_period_u = 3.0;
-  wall.pane_period_v = 2.8;
+  wall.pane_period_v = 2.9;
   wall.pane_width = 1.3;
   wall.pane_height = 1.5;
   scene.add("building", upright_box({22, -14, -1}, {28, 14, 6.0}), wall);

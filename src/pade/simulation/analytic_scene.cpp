@@ -118,7 +118,7 @@ double pane_coverage(const Surface& surface, int face, const Eigen::Vector3d& po
 /// Texture averaged over the footprint: a few probes along its longer axis, each as wide as the shorter one,
 /// so that ground seen at a grazing angle keeps the texture that a camera would see across the line of sight.
 double texture(const Material& material, const Eigen::Vector3d& point, const Footprint& footprint) {
-  constexpr double kMostProbes = 8;
+  constexpr double kMostProbes = 4;
   const double ratio = footprint.major_length / std::max(footprint.minor_length, 1e-12);
   const double probes = std::clamp(std::ceil(ratio - 0.5), 1.0, kMostProbes);
   const double width = std::max(footprint.minor_length, footprint.major_length / probes);

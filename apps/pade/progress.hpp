@@ -1,0 +1,51 @@
+// One line on a terminal that tells how far a long job is. In a pipe it is silent.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+namespace pade::cli {
+
+/// "Rendering  12 of 40  5.1 per second", rewritten in place on standard error at most ten times a second.
+class Progress {
+ public:
+  Progress(std::string what, std::size_t total)
+      : what_(std::move(what)), total_(total), visible_(isatty(STDERR_FILENO) != 0) {}
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  ~Progress() {
+    if (shown_) fmt::print(stderr, "\r\033[K");
+  }
+
+  /// One more of the total is done. `note` is appended as it is.
+  void step(const std::string& note = {}) {
+    ++done_;
+    if (!visible_) return;
+    const auto now = Clock::now();
+    if (done_ < total_ && shown_ && now - last_ < std::chrono::milliseconds(100)) return;
+    last_ = now;
+    shown_ = true;
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    fmt::print(stderr, "\r\033[K{}  {} of {}  {:.1f} per second  {}", what_, done_, total_,
+               static_cast<double>(done_) / seconds, note);
+    std::fflush(stderr);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::string what_;
+  std::size_t total_;
+  std::size_t done_ = 0;
+  bool visible_;
+  bool shown_ = false;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point last_;
+};
+
+}  // namespace pade::cli
