@@ -13,6 +13,7 @@ struct Context {
 
 // Listed in the order of the help text. Add a declaration here and a call in main.cpp for a new subcommand.
 void add_flow(CLI::App& app, Context& context);
+void add_map(CLI::App& app, Context& context);
 void add_sample(CLI::App& app, Context& context);
 void add_completion(CLI::App& app, Context& context);  // last: it describes all the others
 

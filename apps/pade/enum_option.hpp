@@ -13,11 +13,13 @@ namespace pade::cli {
 
 /// `--name a|b|c`: sets `value`; left alone where the option is not given.
 template <NamedEnum Enum>
-CLI::Option* add_enum(CLI::App& app, const std::string& name, std::optional<Enum>& value, const std::string& help) {
+CLI::Option* add_enum(CLI::App& app, const std::string& name, std::optional<Enum>& value,
+                      const std::string& help) {
   std::vector<std::string> names;
   for (const auto& entry : EnumNames<Enum>::names) names.emplace_back(entry.second);
   return app
-      .add_option_function<std::string>(name, [&value](const std::string& text) { value = from_name<Enum>(text); }, help)
+      .add_option_function<std::string>(
+          name, [&value](const std::string& text) { value = from_name<Enum>(text); }, help)
       ->check(CLI::IsMember(names));
 }
 

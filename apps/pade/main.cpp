@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   pade::cli::Context context;
   pade::cli::add_flow(app, context);
+  pade::cli::add_map(app, context);
   pade::cli::add_sample(app, context);
   pade::cli::add_completion(app, context);
   CLI11_PARSE(app, argc, argv);

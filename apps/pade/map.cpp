@@ -117,7 +117,8 @@ void print_table(const MapArguments& arguments, const MapResult& result) {
              info.health.frames, info.health.depth_images, info.health.skipped.size());
   constexpr std::size_t kNamed = 5;
   for (std::size_t i = 0; i < std::min(kNamed, info.health.skipped.size()); ++i) {
-    fmt::print("{:14} {}: {}\n", i == 0 ? "  skipped" : "", info.health.skipped[i].file, info.health.skipped[i].reason);
+    fmt::print("{:14} {}: {}\n", i == 0 ? "  skipped" : "", info.health.skipped[i].file,
+               info.health.skipped[i].reason);
   }
   if (info.health.skipped.size() > kNamed) {
     fmt::print("{:14} ... and {} more, in run.json\n", "", info.health.skipped.size() - kNamed);
@@ -127,8 +128,10 @@ void print_table(const MapArguments& arguments, const MapResult& result) {
   for (const std::uint64_t count : info.state_pixels) cells += count;
   fmt::print("{:14}", "Pixels");
   for (std::size_t s = 0; s < info.state_pixels.size(); ++s) {
-    const double share = cells > 0 ? static_cast<double>(info.state_pixels[s]) / static_cast<double>(cells) : 0;
-    fmt::print(" {:.1f} % {}{}", 100 * share, depth_state_names[s], s + 1 < info.state_pixels.size() ? "," : "\n");
+    const double share =
+        cells > 0 ? static_cast<double>(info.state_pixels[s]) / static_cast<double>(cells) : 0;
+    fmt::print(" {:.1f} % {}{}", 100 * share, depth_state_names[s],
+               s + 1 < info.state_pixels.size() ? "," : "\n");
   }
   if (info.map) {
     fmt::print("{:14} {} occupied and {} free voxels of {} m\n", "Map", info.map->occupied_voxels,
@@ -136,9 +139,10 @@ void print_table(const MapArguments& arguments, const MapResult& result) {
   }
   if (!result.timing.stages.empty()) {
     const io::StageTiming& total = result.timing.stages.back();
-    fmt::print("{:14} {:.1f} frames/s; latency {:.1f} ms median, {:.1f} p99, {:.1f} max; peak memory {:.0f} MB\n", "Time",
-               result.timing.frames_per_second, total.p50, total.p99, total.max,
-               static_cast<double>(result.timing.peak_memory) / 1e6);
+    fmt::print(
+        "{:14} {:.1f} frames/s; latency {:.1f} ms median, {:.1f} p99, {:.1f} max; peak memory {:.0f} MB\n",
+        "Time", result.timing.frames_per_second, total.p50, total.p99, total.max,
+        static_cast<double>(result.timing.peak_memory) / 1e6);
   }
   if (result.accuracy) fmt::print("\n{}", evaluation::to_table(*result.accuracy));
   fmt::print("\nWritten to {}{}\n", arguments.out,
@@ -164,16 +168,24 @@ void run(const MapArguments& arguments, Context& context) {
 void add_pipeline_options(CLI::App& map, MapArguments& a) {
   std::vector<std::string> methods = flow::flow_estimator_names();
   methods.emplace_back("dis");
-  map.add_option("--flow", a.flow, "optical-flow method; dis = dis-medium (the default)")->check(CLI::IsMember(methods));
-  add_enum(map, "--depth", a.method, "depth from the pose (pade, the default) or from time to collision (ttc)");
-  add_enum(map, "--model", a.model, "finite motion (exact, the default) or Eq. 1 of the paper (instantaneous)");
+  map.add_option("--flow", a.flow, "optical-flow method; dis = dis-medium (the default)")
+      ->check(CLI::IsMember(methods));
+  add_enum(map, "--depth", a.method,
+           "depth from the pose (pade, the default) or from time to collision (ttc)");
+  add_enum(map, "--model", a.model,
+           "finite motion (exact, the default) or Eq. 1 of the paper (instantaneous)");
   add_enum(map, "--reading", a.reading, "how Eq. 2 is inverted (default least-squares)");
-  add_enum(map, "--derotate", a.derotate, "remove rotation from the image before matching (default) or from the flow");
-  add_enum(map, "--order", a.order, "depth on the newest frame of a pair (default, no latency) or on the first");
+  add_enum(map, "--derotate", a.derotate,
+           "remove rotation from the image before matching (default) or from the flow");
+  add_enum(map, "--order", a.order,
+           "depth on the newest frame of a pair (default, no latency) or on the first");
   add_enum(map, "--gates", a.gates, "off: publish every positive depth, however doubtful (default on)");
-  map.add_option("--window", a.window, "n: one depth per n x n pixels (default 1)")->check(CLI::Range(1, 1024));
-  map.add_option("--step", a.step, "pair each frame with the k-th before it (default 1)")->check(CLI::Range(1, 1000));
-  map.add_option("--range", a.range, "farthest depth that is published, m (default 20)")->check(CLI::PositiveNumber);
+  map.add_option("--window", a.window, "n: one depth per n x n pixels (default 1)")
+      ->check(CLI::Range(1, 1024));
+  map.add_option("--step", a.step, "pair each frame with the k-th before it (default 1)")
+      ->check(CLI::Range(1, 1000));
+  map.add_option("--range", a.range, "farthest depth that is published, m (default 20)")
+      ->check(CLI::PositiveNumber);
   map.add_option("--voxel", a.voxel, "side of the map's voxels, m (default 0.1)")->check(CLI::PositiveNumber);
   map.add_option("--map-range", a.map_range, "depth up to which the map is updated, m (default 20)")
       ->check(CLI::PositiveNumber);

@@ -12,8 +12,8 @@ std::uint64_t cube_of(const CloudPoint& point, double spacing) {
   constexpr std::int64_t kOffset = 1 << 20;
   constexpr std::uint64_t kMask = (1U << 21) - 1;
   const auto cell = [&](float value) {
-    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(static_cast<double>(value) / spacing)) +
-                                      kOffset) &
+    return static_cast<std::uint64_t>(
+               static_cast<std::int64_t>(std::floor(static_cast<double>(value) / spacing)) + kOffset) &
            kMask;
   };
   return cell(point.x) << 42 | cell(point.y) << 21 | cell(point.z);

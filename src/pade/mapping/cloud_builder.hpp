@@ -20,19 +20,21 @@ struct CloudOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("spacing", self.spacing, "the best point of each cube of this side is kept, m");
-    field("largest_relative_sigma", self.largest_relative_sigma, "depths less certain than this share of Z are left out");
+    field("largest_relative_sigma", self.largest_relative_sigma,
+          "depths less certain than this share of Z are left out");
     field("step", self.step, "takes every step-th cell of every step-th row");
   }
 };
 
-/// Keeps, of each small cube of space, the point with the least sigma. The order is that in which cubes were first
-/// seen, so that the same images give the same cloud.
+/// Keeps, of each small cube of space, the point with the least sigma. The order is that in which cubes were
+/// first seen, so that the same images give the same cloud.
 class CloudBuilder {
  public:
   explicit CloudBuilder(const CloudOptions& options = {}) : options_(options) {}
 
   /// Arguments as of back_project().
-  void add(const DepthImage& image, const Camera& camera, const Pose& T_world_camera, const cv::Mat& intensity);
+  void add(const DepthImage& image, const Camera& camera, const Pose& T_world_camera,
+           const cv::Mat& intensity);
 
   [[nodiscard]] const PointCloud& cloud() const { return cloud_; }
 

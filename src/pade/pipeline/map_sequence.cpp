@@ -60,7 +60,8 @@ class Reader {
 /// Everything a run gathers while it goes.
 class Run {
  public:
-  Run(const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer, ObstacleMapper mapper)
+  Run(const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer,
+      ObstacleMapper mapper)
       : sequence_(sequence),
         options_(options),
         writer_(writer),
@@ -94,7 +95,8 @@ class Run {
   }
 
   [[nodiscard]] MapProgress progress(std::size_t done) const {
-    return {done, sequence_.size(), mapper_.health().mapped, sequence_.skipped().size() + undecodable_.size()};
+    return {done, sequence_.size(), mapper_.health().mapped,
+            sequence_.skipped().size() + undecodable_.size()};
   }
 
   Result<MapResult> finish(double seconds) {
@@ -120,9 +122,11 @@ class Run {
     accuracy_.add(update.depth, truth);
     cloud_.add(update.depth, sequence_.camera(), update.reference.T_world_camera, image);
     if (options_.report && std::find(shown_.begin(), shown_.end(), time) != shown_.end()) {
-      frames_.push_back({to_string(time), image.clone(), update.flow.vectors.clone(),
-                         {time, update.depth.window, update.depth.depth.clone(), update.depth.variance.clone(),
-                          update.depth.state.clone()},
+      frames_.push_back({to_string(time),
+                         image.clone(),
+                         update.flow.vectors.clone(),
+                         {time, update.depth.window, update.depth.depth.clone(),
+                          update.depth.variance.clone(), update.depth.state.clone()},
                          truth.clone()});
     }
     return writer_.add(update.depth, update.flow);
@@ -192,9 +196,9 @@ class Run {
   ObstacleMapper mapper_;
   mapping::CloudBuilder cloud_;
   evaluation::Accumulator accuracy_;
-  std::vector<Time> shown_;                     // frames of the report
+  std::vector<Time> shown_;  // frames of the report
   std::vector<evaluation::ReportFrame> frames_;
-  std::map<Time, cv::Mat> truths_;              // of the frames whose depth may still come
+  std::map<Time, cv::Mat> truths_;  // of the frames whose depth may still come
   std::vector<io::Skipped> undecodable_;
   std::vector<Eigen::Vector3d> path_;
   std::array<std::vector<double>, stage_names.size()> milliseconds_;
@@ -203,8 +207,9 @@ class Run {
 
 }  // namespace
 
-Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer,
-                               int threads, const std::function<bool(const MapProgress&)>& progress) {
+Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,
+                               io::RunWriter& writer, int threads,
+                               const std::function<bool(const MapProgress&)>& progress) {
   auto mapper = ObstacleMapper::create(sequence.camera(), options.mapper, sequence.mask());
   if (!mapper) return mapper.error();
 

@@ -46,9 +46,11 @@ struct MapResult {
 };
 
 /// Maps a sequence and writes the run. Nothing is left behind where this fails or `progress` returns false.
-/// @param threads   1: everything on the calling thread. 2: the next frame is read ahead. Same bytes either way.
+/// @param threads   1: everything on the calling thread. 2: the next frame is read ahead. Same bytes either
+/// way.
 /// @param progress  called after every frame; false stops the run with io::interrupted_error(). May be empty.
-Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer,
-                               int threads, const std::function<bool(const MapProgress&)>& progress = {});
+Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,
+                               io::RunWriter& writer, int threads,
+                               const std::function<bool(const MapProgress&)>& progress = {});
 
 }  // namespace pade

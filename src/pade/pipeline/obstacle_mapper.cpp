@@ -75,8 +75,9 @@ Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const Obstac
   return ObstacleMapper(camera, options, valid, std::move(flow).value(), std::move(map).value());
 }
 
-ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid,
-                               std::unique_ptr<flow::FlowEstimator> flow, mapping::OccupancyMap map)
+ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options,
+                               const cv::Mat& valid, std::unique_ptr<flow::FlowEstimator> flow,
+                               mapping::OccupancyMap map)
     : camera_(camera),
       options_(options),
       valid_(valid.clone()),

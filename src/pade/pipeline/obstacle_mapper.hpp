@@ -69,7 +69,7 @@ struct MapperUpdate {
   FlowField flow;         ///< from the reference to the other image (derotated where derotate = image)
   DepthImage depth;
   depth::DepthDiagnostics diagnostics;
-  mapping::MapChange change;  ///< what the depth image changed in the map
+  mapping::MapChange change;                         ///< what the depth image changed in the map
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
 };
 
