@@ -26,6 +26,9 @@ void check(const pade::Result<Trajectory>& read) {
   }
   const auto middle = read->at(rows[rows.size() / 2].time, 1);
   PADE_EXPECT(middle);
+  const pade::Time between{rows.front().time.nanoseconds / 2 + rows.back().time.nanoseconds / 2};
+  const auto interpolated = read->at(between, 1e12);
+  PADE_EXPECT(!interpolated || std::abs(interpolated->rotation.norm() - 1) < 1e-9);
   ReadReport report;
   const auto again = pade::io::parse_trajectory(pade::io::format_trajectory(rows), "again", report);
   PADE_EXPECT(again && again->size() == rows.size() && report.skipped.empty() && report.notes.empty());

@@ -230,6 +230,7 @@ INSTANTIATE_TEST_SUITE_P(
                  replaced("distortion_model", "none") + "distortion: [0.1]\n",
                  {"appears twice"}},
         BadField{"ZeroDepthScale", kGood + "depth_scale: 0\n", {"field depth_scale", "positive"}},
+        BadField{"OffsetOfYears", kGood + "time_offset_s: 1e9\n", {"field time_offset_s", "at most a day"}},
         BadField{"WordAsUp", kGood + "world_up: upward\n", {"field world_up", "found \"upward\"", "+z"}},
         BadField{"ZeroUp", kGood + "world_up: [0, 0, 0]\n", {"field world_up", "not all zero"}},
         BadField{"PlanarUp", kGood + "world_up: [0, 1]\n", {"field world_up", "found a list of 2 values"}},

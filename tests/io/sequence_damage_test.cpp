@@ -103,6 +103,12 @@ TEST_F(DamagedSequence, FolderWithoutImagesIsRefused) {
   expect_refused({"no images found"});
 }
 
+TEST_F(DamagedSequence, ImagesWhoseNamesAreNoTimesAreRefusedWithAnExample) {
+  std::filesystem::remove_all(folder_ / "rgb");
+  test::write_image(folder_.path() / "rgb" / "frame.png", flight_.images[0]);
+  expect_refused({"no images found", "frame.png", "found name \"frame\", expected the time in seconds"});
+}
+
 TEST_F(DamagedSequence, PngCutShortIsSkipped) {
   cut_short(2);
   expect_skipped_frame(2, "the PNG is cut short");

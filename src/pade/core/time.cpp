@@ -8,7 +8,7 @@
 namespace pade {
 namespace {
 constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
-constexpr double kLargestSecond = 9.2e9;
+constexpr double kLargestSecond = 4.6e9;  // half of the range of int64, so that every difference fits
 }  // namespace
 
 Time Time::from_seconds(double seconds) { return {static_cast<std::int64_t>(std::llround(seconds * 1e9))}; }

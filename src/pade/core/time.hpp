@@ -27,8 +27,8 @@ inline double seconds_between(Time b, Time a) {
 std::string to_string(Time time);
 
 /// Parses decimal seconds ("1305031102.175304", "12", "-0.5", "1e3") without passing through a double where
-/// the text has no exponent. Empty where the text is not wholly a finite number in the range of int64
-/// nanoseconds.
+/// the text has no exponent. Empty where the text is not wholly a number of at most 4.6e9 seconds (the
+/// year 2115) in magnitude, so that the difference of any two times fits.
 std::optional<Time> parse_time(std::string_view text);
 
 }  // namespace pade

@@ -140,6 +140,15 @@ std::optional<PoseConvention> read_pose_convention(Fields& fields) {
   return convention;
 }
 
+std::optional<double> read_time_offset(Fields& fields, std::string_view name) {
+  constexpr double kLargest = 86400;
+  const auto offset = fields.number(name);
+  if (offset && !(std::abs(*offset) <= kLargest)) {
+    fields.wrong(*fields.find({name}), name, "an offset between clocks of at most a day, in seconds");
+  }
+  return offset;
+}
+
 /// A list of exactly N numbers.
 template <std::size_t N>
 std::optional<std::array<double, N>> read_list(Fields& fields, std::string_view name,
@@ -161,7 +170,7 @@ Result<Calibration> read_camera_yaml(const Yaml& root, const std::string& file) 
   out.format = "camera.yaml";
   out.camera = read_camera_yaml_lens(fields);
   out.T_body_camera = fields.transform("T_body_camera");
-  out.time_offset_s = fields.number("time_offset_s");
+  out.time_offset_s = read_time_offset(fields, "time_offset_s");
   out.pose_convention = read_pose_convention(fields);
   out.depth_scale = fields.positive("depth_scale", "a positive number of counts per metre");
   out.world_up = read_world_up(fields);
@@ -196,7 +205,7 @@ Result<Calibration> read_kalibr(const Yaml& camera_node, const std::string& file
   read_distortion(fields, camera, fields.text("distortion_model", kModel).value_or(""),
                   {"distortion_coeffs"});
   if (const auto T_camera_imu = fields.transform("T_cam_imu")) out.T_body_camera = T_camera_imu->inverse();
-  out.time_offset_s = fields.number("timeshift_cam_imu");  // t_imu = t_cam + shift
+  out.time_offset_s = read_time_offset(fields, "timeshift_cam_imu");  // t_imu = t_cam + shift
   fields.ignore({"cam_overlaps", "rostopic", "T_cn_cnm1", "label", "id"});
   out.camera = camera;
   return finish(fields, std::move(out));

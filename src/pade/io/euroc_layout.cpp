@@ -20,7 +20,10 @@ std::optional<Time> parse_nanoseconds(std::string_view text) {
   Time time;
   const char* const end = text.data() + text.size();
   const auto [stop, status] = std::from_chars(text.data(), end, time.nanoseconds);
-  if (status != std::errc{} || stop != end) return std::nullopt;
+  constexpr std::int64_t kLargest = 4'600'000'000'000'000'000;  // as parse_time: every difference fits
+  if (status != std::errc{} || stop != end || time.nanoseconds > kLargest || time.nanoseconds < -kLargest) {
+    return std::nullopt;
+  }
   return time;
 }
 

@@ -173,21 +173,21 @@ std::optional<GeographicOrigin> gnss_origin(const fs::path& folder) {
   return GeographicOrigin{*latitude, *longitude, *height};
 }
 
+std::string first_reason(const ReadReport& report) {
+  if (report.skipped.empty()) return {};
+  return fmt::format("; first: {}: {}", report.skipped[0].file, report.skipped[0].reason);
+}
+
 /// The rule of docs/sequences.md for frames that cannot be used.
 Status enough_usable(std::size_t usable, std::size_t listed, const ReadReport& report,
                      const fs::path& folder) {
-  const auto why = [&] {
-    return report.skipped.empty()
-               ? std::string()
-               : fmt::format("; first: {}: {}", report.skipped[0].file, report.skipped[0].reason);
-  };
   if (usable < 2) {
     return Error{fmt::format("{}: {} of {} frames usable, expected at least 2{}", folder.string(), usable,
-                             listed, why())};
+                             listed, first_reason(report))};
   }
   if (2 * (listed - usable) > listed) {
     return Error{fmt::format("{}: {} of {} frames unusable, expected at most half{}", folder.string(),
-                             listed - usable, listed, why())};
+                             listed - usable, listed, first_reason(report))};
   }
   return {};
 }
@@ -239,7 +239,8 @@ struct Sequence::Data {
 /// Camera and frames.
 Status Sequence::Data::choose_frames() {
   if (listing.images.empty()) {
-    return Error{fmt::format("{}: no images found, expected {} images", folder.string(), listing.layout)};
+    return Error{fmt::format("{}: no images found in the layout {}{}", folder.string(), listing.layout,
+                             first_reason(report))};
   }
   const Calibration& calibration = listing.calibration;
   if (!calibration.camera) {
