@@ -12,10 +12,10 @@ namespace {
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 /// Z - k sigma per cell, at most the range; NaN where nothing was measured.
-std::vector<float> free_ends(const DepthImage& image, const Clearance::Parameters& parameters) {
+void free_ends(const DepthImage& image, const Clearance::Parameters& parameters, std::vector<float>& ends) {
   const int width = image.depth.cols;
   const int height = image.depth.rows;
-  std::vector<float> ends(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), kUnknown);
+  ends.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), kUnknown);
   for (int v = 0; v < height; ++v) {
     const auto* depth = image.depth.ptr<float>(v);
     const auto* variance = image.variance.empty() ? nullptr : image.variance.ptr<float>(v);
@@ -29,79 +29,86 @@ std::vector<float> free_ends(const DepthImage& image, const Clearance::Parameter
       end[u] = static_cast<float>(std::clamp(z - parameters.margin_sigmas * sigma, 0.0, parameters.range));
     }
   }
-  return ends;
 }
 
 /// For each cell the nearest end within the 3 x 3 cells around it. `fill_only`: only cells that know nothing
 /// are given one, where most of their neighbours know something; the others keep their own.
-std::vector<float> nearest_of_neighbours(const std::vector<float>& ends, int width, int height,
-                                         bool fill_only) {
-  std::vector<float> out = ends;
+void nearest_of_neighbours(std::vector<float>& ends, std::vector<float>& out, int width, int height,
+                           bool fill_only) {
+  out = ends;
+  const auto index = [width](int v, int u) {
+    return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+  };
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
-      const std::size_t here =
-          static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
-      const bool known = !std::isnan(ends[here]);
+      const bool known = !std::isnan(ends[index(v, u)]);
       if (known == fill_only) continue;
       float nearest = std::numeric_limits<float>::infinity();
       int count = 0;
       for (int y = std::max(v - 1, 0); y <= std::min(v + 1, height - 1); ++y) {
         for (int x = std::max(u - 1, 0); x <= std::min(u + 1, width - 1); ++x) {
-          const float end = ends[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                                 static_cast<std::size_t>(x)];
+          const float end = ends[index(y, x)];
           if (std::isnan(end)) continue;
           nearest = std::min(nearest, end);
           ++count;
         }
       }
-      if (known || count >= 5) out[here] = nearest;
+      if (known || count >= 5) out[index(v, u)] = nearest;
     }
   }
-  return out;
+  ends.swap(out);
 }
 
 }  // namespace
 
-Clearance::Clearance(const DepthImage& image, const Camera& camera, const Pose& T_world_camera,
-                     const Parameters& parameters)
-    : camera_(camera_of_cells(camera, image.window)),
-      parameters_(parameters),
-      R_camera_world_(T_world_camera.matrix3().transpose()),
-      reach_(0.5 * R_camera_world_.cwiseAbs().rowwise().sum()),
-      origin_(T_world_camera.translation) {
-  std::vector<float> ends = free_ends(image, parameters);
+void Clearance::set(const DepthImage& image, const Camera& camera, const Pose& T_world_camera,
+                    const Parameters& parameters) {
+  camera_ = camera_of_cells(camera, image.window);
+  parameters_ = parameters;
+  R_camera_world_ = T_world_camera.matrix3().transpose();
+  origin_ = T_world_camera.translation;
+  reach_ = 0.5 * R_camera_world_.cwiseAbs().rowwise().sum();
+
   const int width = image.depth.cols;
   const int height = image.depth.rows;
+  free_ends(image, parameters, ends_);
   // A window that straddles an edge has a depth between the two surfaces: its neighbours know the nearer one.
-  if (image.window > 1) ends = nearest_of_neighbours(ends, width, height, false);
+  if (image.window > 1) nearest_of_neighbours(ends_, scratch_, width, height, false);
   // Single pixels that failed among others that did not: without this, no large cube would ever be decided at
   // once.
-  ends = nearest_of_neighbours(ends, width, height, true);
-  build_pyramid(ends, width, height);
+  nearest_of_neighbours(ends_, scratch_, width, height, true);
+  build_pyramid(width, height);
 
-  const double left = camera_.cx + 0.5;
-  const double right = camera_.width - 0.5 - camera_.cx;
-  const double top = camera_.cy + 0.5;
-  const double bottom = camera_.height - 0.5 - camera_.cy;
-  Eigen::Matrix<double, 4, 3> normals;  // in the camera's frame: inside where normal . point >= 0
-  normals << camera_.fx, 0, left, -camera_.fx, 0, right, 0, camera_.fy, top, 0, -camera_.fy, bottom;
-  side_normals_ = normals.rowwise().normalized() * R_camera_world_;
-  side_reach_ = 0.5 * side_normals_.cwiseAbs().rowwise().sum();
+  Eigen::Matrix<double, 4, 3> normals;                   // inside where normal . point >= 0
+  normals << camera_.fx, 0, camera_.cx + 0.5,            //
+      -camera_.fx, 0, camera_.width - 0.5 - camera_.cx,  //
+      0, camera_.fy, camera_.cy + 0.5,                   //
+      0, -camera_.fy, camera_.height - 0.5 - camera_.cy;
+  normals.rowwise().normalize();
+  side_x_ = normals.col(0);
+  side_y_ = normals.col(1);
+  side_z_ = normals.col(2);
+  side_reach_ = 0.5 * (normals * R_camera_world_).cwiseAbs().rowwise().sum();
 }
 
-void Clearance::build_pyramid(const std::vector<float>& free_end, int width, int height) {
-  Level base{width, height, {}};
-  base.cells.reserve(free_end.size());
-  for (const float end : free_end) {
-    base.cells.push_back(std::isnan(end) ? Cell{std::numeric_limits<float>::infinity(), 0, 0}
-                                         : Cell{end, end, 1});
-  }
-  levels_.push_back(std::move(base));
-  while (levels_.back().width > 1 || levels_.back().height > 1) {
-    const Level& fine = levels_.back();
-    Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+void Clearance::build_pyramid(int width, int height) {
+  constexpr Cell kNothing{std::numeric_limits<float>::infinity(), 0, 0};
+  std::size_t count = 1;
+  for (int w = width, h = height; w > 1 || h > 1; w = (w + 1) / 2, h = (h + 1) / 2) ++count;
+  levels_.resize(count);
+
+  Level& base = levels_[0];
+  base.width = width;
+  base.height = height;
+  base.cells.clear();
+  for (const float end : ends_) base.cells.push_back(std::isnan(end) ? kNothing : Cell{end, end, 1});
+  for (std::size_t level = 1; level < count; ++level) {
+    const Level& fine = levels_[level - 1];
+    Level& coarse = levels_[level];
+    coarse.width = (fine.width + 1) / 2;
+    coarse.height = (fine.height + 1) / 2;
     coarse.cells.assign(static_cast<std::size_t>(coarse.width) * static_cast<std::size_t>(coarse.height),
-                        Cell{std::numeric_limits<float>::infinity(), 0, 0});
+                        kNothing);
     for (int v = 0; v < fine.height; ++v) {
       const Cell* from = &fine.cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(fine.width)];
       Cell* to = &coarse.cells[static_cast<std::size_t>(v / 2) * static_cast<std::size_t>(coarse.width)];
@@ -112,7 +119,6 @@ void Clearance::build_pyramid(const std::vector<float>& free_end, int width, int
         cell.known += from[u].known;
       }
     }
-    levels_.push_back(std::move(coarse));
   }
 }
 
@@ -144,36 +150,35 @@ Clearance::Seen Clearance::over(int u0, int v0, int u1, int v1) const {
 }
 
 View Clearance::look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const {
-  const Eigen::Vector3d offset = centre - origin_;
-  const Eigen::Vector3d p = R_camera_world_ * offset;
   const Eigen::Vector3d half = side * reach_;
-  const double z_near = p.z() - half.z();
-  const double z_far = p.z() + half.z();
+  const double z_near = centre.z() - half.z();
+  const double z_far = centre.z() + half.z();
   if (z_far <= 0 || z_near >= parameters_.range) return View::nothing;
-  const Eigen::Vector4d inside = side_normals_ * offset;
+  const Eigen::Vector4d inside = side_x_ * centre.x() + side_y_ * centre.y() + side_z_ * centre.z();
   if ((inside + side * side_reach_).minCoeff() < 0) return View::nothing;
-  const bool whole = (inside - side * side_reach_).minCoeff() >= 0;
   if (is_voxel && inside.minCoeff() < 0) return View::nothing;  // its centre is outside the image
   if (z_near <= 0.02 * z_far) return is_voxel ? View::nothing : View::partly;
 
   // The pixels of the box around the cube along the camera's axes, which are no fewer than those of the cube.
-  const auto pixel = [](double x, double z, double focal, double principal) {
-    return std::floor(focal * x / z + principal + 0.5);
-  };
-  const auto low = [&](double x, double f, double c) { return pixel(x, x < 0 ? z_near : z_far, f, c); };
-  const auto high = [&](double x, double f, double c) { return pixel(x, x < 0 ? z_far : z_near, f, c); };
+  const double per_near = 1 / z_near;
+  const double per_far = 1 / z_far;
   constexpr double kRounding = 1e-9;
-  const Camera& c = camera_;
-  const auto clip = [](double value, int size) {
-    return static_cast<int>(std::clamp(value, 0.0, size - 1.0));
+  const auto first = [&](double x, double f, double c, int size) {
+    x -= kRounding;
+    return static_cast<int>(std::clamp(f * x * (x < 0 ? per_near : per_far) + c, 0.0, size - 1.0) + 0.5);
   };
-  const Seen seen = over(clip(low(p.x() - half.x() - kRounding, c.fx, c.cx), c.width),
-                         clip(low(p.y() - half.y() - kRounding, c.fy, c.cy), c.height),
-                         clip(high(p.x() + half.x() + kRounding, c.fx, c.cx), c.width),
-                         clip(high(p.y() + half.y() + kRounding, c.fy, c.cy), c.height));
+  const auto last = [&](double x, double f, double c, int size) {
+    x += kRounding;
+    return static_cast<int>(std::clamp(f * x * (x < 0 ? per_far : per_near) + c, 0.0, size - 1.0) + 0.5);
+  };
+  const Camera& c = camera_;
+  const Seen seen = over(
+      first(centre.x() - half.x(), c.fx, c.cx, c.width), first(centre.y() - half.y(), c.fy, c.cy, c.height),
+      last(centre.x() + half.x(), c.fx, c.cx, c.width), last(centre.y() + half.y(), c.fy, c.cy, c.height));
   if (seen.farthest <= z_near) return View::nothing;
   const bool before_all = seen.nearest > z_far;
   if (is_voxel) return before_all && seen.share >= parameters_.known_share ? View::free : View::nothing;
+  const bool whole = (inside - side * side_reach_).minCoeff() >= 0;
   return before_all && whole && seen.share >= 1 ? View::free : View::partly;
 }
 

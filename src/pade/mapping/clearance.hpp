@@ -29,12 +29,18 @@ class Clearance {
     double known_share = 0.75;  ///< of the pixels that see a voxel, how many must have measured
   };
 
-  /// `image` as OccupancyMap::integrate() takes it.
-  Clearance(const DepthImage& image, const Camera& camera, const Pose& T_world_camera,
-            const Parameters& parameters);
+  /// `image` as OccupancyMap::integrate() takes it. Buffers are kept from call to call.
+  void set(const DepthImage& image, const Camera& camera, const Pose& T_world_camera,
+           const Parameters& parameters);
 
-  /// @param centre  of an axis-aligned cube, world, metres
-  /// @param side    metres
+  /// A point of the world in the camera's frame, and a direction.
+  [[nodiscard]] Eigen::Vector3d in_camera(const Eigen::Vector3d& point) const {
+    return R_camera_world_ * (point - origin_);
+  }
+  [[nodiscard]] const Eigen::Matrix3d& R_camera_world() const { return R_camera_world_; }
+
+  /// @param centre    of a cube along the axes of the world, in the camera's frame, metres
+  /// @param side      metres
   /// @param is_voxel  a voxel is not divided further: the answer is `free` or `nothing`
   [[nodiscard]] View look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const;
 
@@ -54,16 +60,17 @@ class Clearance {
     float farthest;
     double share;  // of known pixels
   };
-  void build_pyramid(const std::vector<float>& free_end, int width, int height);
+  void build_pyramid(int width, int height);
   [[nodiscard]] Seen over(int u0, int v0, int u1, int v1) const;
 
   Camera camera_;  // of the cells
   Parameters parameters_;
   Eigen::Matrix3d R_camera_world_;
-  Eigen::Vector3d reach_;                     // half extents of a cube of side 1 along the axes of the camera
   Eigen::Vector3d origin_;                    // of the camera, world
-  Eigen::Matrix<double, 4, 3> side_normals_;  // of the viewing frustum, inward, world
-  Eigen::Vector4d side_reach_;                // support of a cube of side 1 along them
+  Eigen::Vector3d reach_;                     // half extents of a cube of side 1 along the axes of the camera
+  Eigen::Vector4d side_x_, side_y_, side_z_;  // inward normals of the viewing frustum's sides, camera
+  Eigen::Vector4d side_reach_;                // half extents of a cube of side 1 along them
+  std::vector<float> ends_, scratch_;         // Z - k sigma per cell
   std::vector<Level> levels_;
 };
 

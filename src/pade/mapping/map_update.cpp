@@ -1,7 +1,8 @@
 #include "pade/mapping/map_update.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <utility>
 
 namespace pade::mapping {
 namespace {
@@ -26,28 +27,21 @@ std::uint16_t gather(std::uint64_t x) {
 
 unsigned bits_below(unsigned depth) { return 3 * (kTreeDepth - depth); }
 
+/// Walks the octree from the top, all in the camera's frame.
 struct FreeSpaceSearch {
   const Clearance& clearance;
-  const Eigen::Vector3d& eye;
-  double reach;
-  double voxel;
   std::vector<CellUpdate>& out;
+  std::array<Eigen::Vector3d, 8> to_child;  // from the centre of a cube of side 1 to those of its eighths
 
   void visit(std::uint64_t code, const Eigen::Vector3d& centre, double side, unsigned depth) const {
-    constexpr double kHalfDiagonal = 0.8660254037844387;  // of a cube of side 1
-    if ((centre - eye).norm() > reach + kHalfDiagonal * side) return;
     const View view = clearance.look_at(centre, side, depth == kTreeDepth);
     if (view == View::nothing) return;
     if (view == View::free) {
       out.push_back({code, depth, false});
       return;
     }
-    const double quarter = 0.25 * side;
     for (std::uint64_t i = 0; i < 8; ++i) {
-      const Eigen::Vector3d child(centre.x() + ((i & 1U) != 0 ? quarter : -quarter),
-                                  centre.y() + ((i & 2U) != 0 ? quarter : -quarter),
-                                  centre.z() + ((i & 4U) != 0 ? quarter : -quarter));
-      visit(code | i << bits_below(depth + 1), child, 0.5 * side, depth + 1);
+      visit(code | i << bits_below(depth + 1), centre + side * to_child[i], 0.5 * side, depth + 1);
     }
   }
 };
@@ -124,10 +118,13 @@ void HitCounter::grow() {
   }
 }
 
-void find_free_cells(const Clearance& clearance, const Eigen::Vector3d& eye, double reach, double voxel,
-                     std::vector<CellUpdate>& out) {
-  const FreeSpaceSearch search{clearance, eye, reach, voxel, out};
-  search.visit(0, Eigen::Vector3d::Zero(), 2.0 * kTreeCentre * voxel, 0);
+void find_free_cells(const Clearance& clearance, double voxel, std::vector<CellUpdate>& out) {
+  FreeSpaceSearch search{clearance, out, {}};
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner((i & 1U) != 0 ? 1 : -1, (i & 2U) != 0 ? 1 : -1, (i & 4U) != 0 ? 1 : -1);
+    search.to_child[i] = 0.25 * clearance.R_camera_world() * corner;
+  }
+  search.visit(0, clearance.in_camera(Eigen::Vector3d::Zero()), 2.0 * kTreeCentre * voxel, 0);
 }
 
 void UpdatableTree::apply(std::span<const CellUpdate> updates, MapChange& change) {

@@ -50,11 +50,8 @@ class HitCounter {
   std::size_t last_ = 0;  // neighbouring pixels mostly hit the same voxel
 };
 
-/// Appends the free cubes that `clearance` shows, largest first possible, in Morton order.
-/// @param eye    camera position, world
-/// @param reach  no cube farther than this from the eye, m
-void find_free_cells(const Clearance& clearance, const Eigen::Vector3d& eye, double reach, double voxel,
-                     std::vector<CellUpdate>& out);
+/// Appends the free cubes that `clearance` shows, as large as they can be, in Morton order.
+void find_free_cells(const Clearance& clearance, double voxel, std::vector<CellUpdate>& out);
 
 /// An octree to which many updates are applied in one pass: each inner node on the way is visited once.
 class UpdatableTree : public octomap::OcTree {

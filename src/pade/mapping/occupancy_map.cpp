@@ -19,6 +19,7 @@ class OccupancyMap::Tree : public UpdatableTree {
 struct OccupancyMap::Scratch {
   HitCounter counter;
   std::vector<CellUpdate> hits, free, updates;
+  Clearance clearance;
 };
 
 namespace {
@@ -55,9 +56,10 @@ Status check(const MapOptions& o) {
   return {};
 }
 
-bool to_key(const Eigen::Vector3d& point, double voxel, octomap::OcTreeKey& key) {
+/// Key of the voxel that holds a point, by the arithmetic of OctoMap's coordToKey. `per_voxel` = 1 / voxel.
+bool to_key(const Eigen::Vector3d& point, double per_voxel, octomap::OcTreeKey& key) {
   for (int axis = 0; axis < 3; ++axis) {
-    const double index = std::floor(point[axis] / voxel) + kTreeCentre;
+    const double index = per_voxel * point[axis] + kTreeCentre;
     if (!(index >= 0 && index < 2 * kTreeCentre)) return false;
     key[static_cast<unsigned>(axis)] = static_cast<octomap::key_type>(index);
   }
@@ -106,24 +108,22 @@ bool OccupancyMap::is_hit(const octomap::OcTreeKey& key, std::uint32_t count, co
   if (count < options_.hit_min_share * pixels) return false;
 
   const HitCounter& counter = scratch_->counter;
-  std::uint32_t peak = 0;
+  const auto most = count / std::max(options_.hit_min_of_peak, 1e-9);  // that a neighbour may have
   for (int i = 0; i < 27; ++i) {
     const octomap::OcTreeKey neighbour(static_cast<octomap::key_type>(key[0] + i % 3 - 1),
                                        static_cast<octomap::key_type>(key[1] + i / 3 % 3 - 1),
                                        static_cast<octomap::key_type>(key[2] + i / 9 - 1));
-    peak = std::max(peak, counter.count(neighbour));
+    if (counter.count(neighbour) > most) return false;
   }
-  if (count < options_.hit_min_of_peak * peak) return false;
-
   // Farther out on the ray only the tails of the noise are left, and a thin thing before a wall must not be
-  // taken for one: a tenth of the points is enough there.
-  peak = 0;
-  for (const double step : {-3.0, -2.0, 2.0, 3.0}) {
+  // taken for one: a fifth of what is asked of a neighbour is enough there.
+  const Eigen::Vector3d step = voxel * ray.normalized();
+  for (const double steps : {-3.0, -2.0, 2.0, 3.0}) {
     octomap::OcTreeKey neighbour;
-    if (!to_key(centre + step * voxel * ray.normalized(), voxel, neighbour)) continue;
-    peak = std::max(peak, counter.count(neighbour));
+    if (to_key(centre + steps * step, 1 / voxel, neighbour) && counter.count(neighbour) > 5 * most)
+      return false;
   }
-  return count >= 0.2 * options_.hit_min_of_peak * peak;
+  return true;
 }
 
 /// Counts the points per voxel and keeps the voxels that enough of their pixels agree on.
@@ -134,6 +134,7 @@ std::size_t OccupancyMap::find_hits(const DepthImage& image, const Camera& camer
   const double max_variance = options_.hit_max_sigma * options_.hit_max_sigma;
   // A surface beyond the range still takes its share of the points that noise has spread.
   const double farthest = options_.range + 3 * options_.voxel;
+  const double per_voxel = 1 / options_.voxel;
   HitCounter& counter = scratch_->counter;
   counter.clear();
   std::size_t outside = 0;
@@ -150,7 +151,7 @@ std::size_t OccupancyMap::find_hits(const DepthImage& image, const Camera& camer
       if (variance != nullptr && !(variance[u] <= max_variance)) continue;
       if (state != nullptr && state[u] != static_cast<std::uint8_t>(DepthState::measured)) continue;
       octomap::OcTreeKey key;
-      if (to_key(T_world_camera.translation + z * (row + u * column), options_.voxel, key)) {
+      if (to_key(T_world_camera.translation + z * (row + u * column), per_voxel, key)) {
         counter.add(key);
       } else {
         ++outside;
@@ -175,13 +176,10 @@ MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera,
   change.outside = find_hits(image, camera, T_world_camera);
   change.hits = scratch_->hits.size();
 
-  const Clearance clearance(image, camera, T_world_camera,
-                            {options_.range, options_.free_margin_sigmas, options_.free_min_known});
-  const double half_width = std::max(camera.cx + 1, camera.width - camera.cx) / camera.fx;
-  const double half_height = std::max(camera.cy + 1, camera.height - camera.cy) / camera.fy;
-  const double reach = options_.range * std::sqrt(1 + half_width * half_width + half_height * half_height);
+  scratch_->clearance.set(image, camera, T_world_camera,
+                          {options_.range, options_.free_margin_sigmas, options_.free_min_known});
   scratch_->free.clear();
-  find_free_cells(clearance, T_world_camera.translation, reach, options_.voxel, scratch_->free);
+  find_free_cells(scratch_->clearance, options_.voxel, scratch_->free);
 
   // No voxel is in both: a free one ends before Z of every pixel that sees it, a hit one contains such a
   // point.
@@ -195,7 +193,7 @@ MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera,
 
 const octomap::OcTreeNode* OccupancyMap::find(const Eigen::Vector3d& point) const {
   octomap::OcTreeKey key;
-  return to_key(point, options_.voxel, key) ? tree_->search(key) : nullptr;
+  return to_key(point, 1 / options_.voxel, key) ? tree_->search(key) : nullptr;
 }
 
 Occupancy OccupancyMap::at(const Eigen::Vector3d& point) const {
