@@ -12,9 +12,11 @@ struct Context {
 };
 
 // Listed in the order of the help text. Add a declaration here and a call in main.cpp for a new subcommand.
-void add_flow(CLI::App& app, Context& context);
 void add_map(CLI::App& app, Context& context);
+void add_evaluate(CLI::App& app, Context& context);
+void add_info(CLI::App& app, Context& context);
 void add_sample(CLI::App& app, Context& context);
+void add_flow(CLI::App& app, Context& context);
 void add_completion(CLI::App& app, Context& context);  // last: it describes all the others
 
 }  // namespace pade::cli

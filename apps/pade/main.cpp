@@ -12,9 +12,11 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "pade " + std::string(pade::version));
   app.require_subcommand(1);
   pade::cli::Context context;
-  pade::cli::add_flow(app, context);
   pade::cli::add_map(app, context);
+  pade::cli::add_evaluate(app, context);
+  pade::cli::add_info(app, context);
   pade::cli::add_sample(app, context);
+  pade::cli::add_flow(app, context);
   pade::cli::add_completion(app, context);
   CLI11_PARSE(app, argc, argv);
   return context.exit_code;

@@ -212,7 +212,7 @@ std::uint64_t peak_memory() {
 
 double scale_for_range(double range) {
   if (!(range > 0) || std::isinf(range)) return kUnlimitedScale;
-  return std::max(1.0, std::floor(65535.0 / range));
+  return std::max(1.0, std::floor(65534.0 / range));
 }
 
 std::string to_json(const RunInfo& info) {

@@ -74,8 +74,9 @@ StageTiming summarise(std::string_view stage, std::vector<double> milliseconds);
 /// Largest resident memory of this process so far, bytes.
 std::uint64_t peak_memory();
 
-/// The counts per metre of a 16-bit image that must hold `range` metres: the largest whole number that fits.
-/// Without a limit (range not positive or infinite): 500, for 131 m.
+/// The counts per metre of a 16-bit image that must hold `range` metres: the largest whole number that fits,
+/// with one count to spare, so that what lies beyond (and saturates) still reads as beyond. Without a limit
+/// (range not positive or infinite): 500, for 131 m.
 double scale_for_range(double range);
 
 std::string to_json(const RunInfo& info);

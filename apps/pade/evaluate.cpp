@@ -1,0 +1,127 @@
+// `pade evaluate`: how accurate the depth of one run or several was.
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pade/evaluation/accuracy_tables.hpp"
+#include "pade/evaluation/run_evaluation.hpp"
+#include "pade/io/atomic_output.hpp"
+
+#include "commands.hpp"
+
+namespace pade::cli {
+namespace {
+
+using evaluation::DepthAccuracy;
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::vector<std::string> runs;
+  std::string sequence;
+  std::string csv;
+  bool json = false;
+  bool force = false;
+};
+
+// From the depth images and the truth where both are there, else what the run wrote down.
+Result<DepthAccuracy> accuracy_of(const std::string& folder, const Arguments& arguments) {
+  const Result<io::Run> run = io::read_run(folder);
+  if (!run) return run.error();
+  const bool asked = !arguments.sequence.empty();
+  const std::filesystem::path source = asked ? std::filesystem::path(arguments.sequence) : run->info.sequence;
+  if (asked || (!run->depth_times.empty() && std::filesystem::exists(source))) {
+    const Result<io::Sequence> sequence = io::Sequence::open(source);
+    if (!sequence && asked) return sequence.error();
+    if (sequence && (asked || sequence->has_truth())) return evaluation::evaluate_stack(*run, *sequence);
+  }
+  Result<std::optional<DepthAccuracy>> stored = evaluation::stored_accuracy(*run);
+  if (!stored) return stored.error();
+  if (*stored) return **stored;
+  return Error{fmt::format(
+      "{}: found neither evaluation.json nor depth images with true depth; the sequence {} has no "
+      "truth to compare with, or is not there (give it with --sequence)",
+      folder, source.string())};
+}
+
+Json json_of(const std::string& run, const DepthAccuracy& accuracy) {
+  Json json = {{"run", run}};
+  json.update(Json::parse(evaluation::to_json(accuracy)));
+  return json;
+}
+
+std::string csv_of(const std::vector<std::string>& names, const std::vector<DepthAccuracy>& all) {
+  std::string csv;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    std::string rows = evaluation::to_csv(all[i]);
+    std::size_t at = 0;
+    for (bool header = true; at < rows.size(); header = false) {
+      const std::size_t end = rows.find('\n', at) + 1;
+      if (!header || i == 0)
+        csv += fmt::format("{},{}", header ? "run" : names[i], rows.substr(at, end - at));
+      at = end;
+    }
+  }
+  return csv;
+}
+
+Status evaluate(const Arguments& arguments) {
+  std::vector<std::string> names = arguments.runs;
+  std::vector<DepthAccuracy> all;
+  for (const std::string& run : arguments.runs) {
+    Result<DepthAccuracy> accuracy = accuracy_of(run, arguments);
+    if (!accuracy) return accuracy.error();
+    all.push_back(std::move(accuracy).value());
+  }
+  if (all.size() > 1) {
+    names.emplace_back("mean over runs");
+    all.push_back(evaluation::average(all));
+  }
+  if (!arguments.csv.empty()) {
+    const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
+    if (Status status = io::write_file(arguments.csv, csv_of(names, all), overwrite); !status) return status;
+  }
+  if (arguments.json) {
+    Json json = Json::array();
+    for (std::size_t i = 0; i < all.size(); ++i) json.push_back(json_of(names[i], all[i]));
+    fmt::print("{}\n", (all.size() == 1 ? json[0] : json).dump(2));
+    return {};
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all.size() > 1) fmt::print("{}{}\n", i > 0 ? "\n" : "", names[i]);
+    fmt::print("{}", evaluation::to_table(all[i]));
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app, Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("evaluate", "Say how accurate the depth of a run was.");
+  command->footer(
+      "Errors are compared with the true depth of the sequence, in ranges of true depth. With the depth "
+      "images at hand\n"
+      "(pade map --save depth) they are computed anew, else printed as the run wrote them down.\n\n"
+      "  pade evaluate out/flight                 a table\n"
+      "  pade evaluate out/* --csv accuracy.csv   several runs and their mean\n");
+  command->add_option("RUN", arguments->runs, "Folder that pade map wrote; several are averaged")->required();
+  command->add_option("--sequence", arguments->sequence, "Where the truth is, if the sequence has moved");
+  command->add_option("--csv", arguments->csv, "Write the figures to this file as well");
+  command->add_flag("--json", arguments->json, "Print JSON instead of a table");
+  command->add_flag("--force", arguments->force, "Replace an existing CSV file");
+  command->callback([arguments, &context] {
+    io::watch_for_interrupts();
+    const Status status = evaluate(*arguments);
+    if (status) return;
+    fmt::print(stderr, "pade evaluate: {}\n", status.error().message);
+    context.exit_code = io::interrupted() ? 130 : 1;
+  });
+}
+
+}  // namespace pade::cli

@@ -1,0 +1,373 @@
+// `pade info`: what is in a sequence, a map or a run, and whether it is sane.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <numbers>
+#include <string>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <octomap/OcTree.h>
+
+#include "pade/evaluation/accuracy_tables.hpp"
+#include "pade/evaluation/run_evaluation.hpp"
+#include "pade/evaluation/sequence_check.hpp"
+#include "pade/io/atomic_output.hpp"
+#include "pade/io/run_reader.hpp"
+#include "pade/io/sequence.hpp"
+
+#include "commands.hpp"
+
+namespace pade::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using evaluation::PoseCheck;
+using evaluation::SequenceCheck;
+using evaluation::Spread;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+struct Arguments {
+  std::string path;
+  std::string poses = "groundtruth";
+  std::string world_up;
+  int step = 1;
+  bool json = false;
+};
+
+template <class... Values>
+void line(std::string_view name, fmt::format_string<Values...> text, Values&&... values) {
+  fmt::print("  {:<12} {}\n", name, fmt::format(text, std::forward<Values>(values)...));
+}
+
+std::string vector_text(const Eigen::Vector3d& v) {
+  return fmt::format("({:.3g}, {:.3g}, {:.3g})", v.x(), v.y(), v.z());
+}
+
+// "-y" where the direction is an axis.
+std::string direction_text(const Eigen::Vector3d& direction) {
+  int axis = 0;
+  if (direction.cwiseAbs().maxCoeff(&axis) < 0.9999) return vector_text(direction);
+  return fmt::format("{}{}", direction[axis] < 0 ? '-' : '+', "xyz"[axis]);
+}
+
+Json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Json json_of(const Spread& spread) {
+  return {{"least", spread.least}, {"median", spread.median}, {"most", spread.most}};
+}
+Json json_of(const io::GeographicOrigin& origin) {
+  return {{"latitude_deg", origin.latitude_deg},
+          {"longitude_deg", origin.longitude_deg},
+          {"height_m", origin.height}};
+}
+
+std::string_view verdict_name(PoseCheck::Verdict verdict) {
+  return verdict == PoseCheck::Verdict::good    ? "good"
+         : verdict == PoseCheck::Verdict::wrong ? "wrong"
+                                                : "unclear";
+}
+
+Json json_of(const PoseCheck& check) {
+  Json scores = Json::array();
+  for (const auto& score : check.scores) {
+    scores.push_back({{"convention", name_of(score.convention)},
+                      {"error", score.error},
+                      {"positive_depth", score.positive_depth},
+                      {"wins", score.wins}});
+  }
+  return {{"verdict", verdict_name(check.verdict)},
+          {"best", name_of(check.best)},
+          {"says", check.sentence},
+          {"measure", check.photometric ? "grey levels" : "pixels from the epipolar line"},
+          {"pairs", check.pairs},
+          {"without_motion", check.without_motion},
+          {"conventions", std::move(scores)}};
+}
+
+Json json_of(const io::Sequence& sequence, const SequenceCheck& check) {
+  const Camera& camera = sequence.camera();
+  Json json = {{"kind", "sequence"},
+               {"folder", sequence.folder().string()},
+               {"layout", sequence.layout()},
+               {"frames", sequence.listed_frames()},
+               {"frames_usable", sequence.size()},
+               {"width", camera.width},
+               {"height", camera.height},
+               {"fx", camera.fx},
+               {"fy", camera.fy},
+               {"cx", camera.cx},
+               {"cy", camera.cy},
+               {"pose_file", sequence.pose_file().string()},
+               {"step", check.step},
+               {"duration_s", check.duration},
+               {"gap_s", json_of(check.gap)},
+               {"baseline_m", json_of(check.baseline)},
+               {"rotation_rad", json_of(check.rotation)},
+               {"forward_share", check.forward_share},
+               {"parallax_at_5_m_px", check.parallax_at_5_metres},
+               {"parallax_px", nullptr},
+               {"truth", nullptr},
+               {"world_up", nullptr},
+               {"geographic_origin", nullptr},
+               {"poses", json_of(check.poses)},
+               {"warnings", check.warnings},
+               {"notes", sequence.notes()},
+               {"skipped", Json::array()}};
+  if (check.parallax) json["parallax_px"] = *check.parallax;
+  if (check.truth_depth)
+    json["truth"] = {{"coverage", *check.truth_coverage}, {"depth_m", json_of(*check.truth_depth)}};
+  if (const auto& up = sequence.world_up())
+    json["world_up"] = {{"direction", json_of(up->direction)}, {"stated", up->stated}};
+  if (const auto& origin = sequence.origin()) json["geographic_origin"] = json_of(*origin);
+  for (const io::Skipped& item : sequence.skipped())
+    json["skipped"].push_back({{"file", item.file}, {"reason", item.reason}});
+  return json;
+}
+
+void print_poses(const PoseCheck& check) {
+  line("convention", "{}", check.sentence);
+  if (check.scores.empty()) return;
+  line("", "error in {}, median of {} pairs (camera at rest: {:.1f}):",
+       check.photometric ? "grey levels" : "px from the epipolar line", check.pairs, check.without_motion);
+  for (const auto& score : check.scores) {
+    const std::string depth =
+        check.photometric ? "" : fmt::format("   {:3.0f} % of tracks in front", 100 * score.positive_depth);
+    line("", "  {:<17} {:5.1f}{}{}", name_of(score.convention), score.error, depth,
+         score.convention == check.best ? "   <- best" : "");
+  }
+}
+
+void print_sequence(const io::Sequence& sequence, const SequenceCheck& check) {
+  const Camera& camera = sequence.camera();
+  const std::string per = check.step == 1 ? "per frame" : fmt::format("per {} frames", check.step);
+  fmt::print("{}: {} sequence, {} of {} frames usable\n", sequence.folder().string(), sequence.layout(),
+             sequence.size(), sequence.listed_frames());
+  line("camera", "{} x {}, f = {:.2f} {:.2f}, c = {:.2f} {:.2f}{}", camera.width, camera.height, camera.fx,
+       camera.fy, camera.cx, camera.cy, sequence.raw_camera().is_pinhole() ? "" : " (distortion is removed)");
+  line("time", "{:.3f} s, {:.2f} frames/s, gaps {:.3f} to {:.3f} s", check.duration,
+       check.gap.median > 0 ? 1 / check.gap.median : 0, check.gap.least, check.gap.most);
+  line("poses", "{}, {} rows", sequence.pose_file().filename().string(), sequence.trajectory().size());
+  line("baseline", "median {:.3f} m {} ({:.3f} to {:.3f}), {:.0f} % of it forward", check.baseline.median,
+       per, check.baseline.least, check.baseline.most, 100 * check.forward_share);
+  line("rotation", "median {:.2f} deg {}, at most {:.2f}", check.rotation.median * kDegrees, per,
+       check.rotation.most * kDegrees);
+  if (check.parallax) line("parallax", "median {:.1f} px {} (from true depth)", *check.parallax, per);
+  line(check.parallax ? "" : "parallax", "{:.1f} px {} for things 5 m away", check.parallax_at_5_metres, per);
+  if (check.truth_depth) {
+    line("true depth", "on {:.0f} % of the pixels, {:.1f} to {:.1f} m", 100 * *check.truth_coverage,
+         check.truth_depth->least, check.truth_depth->most);
+  }
+  if (const auto& up = sequence.world_up()) {
+    line("up", "{} ({}{})", direction_text(up->direction), up->stated ? "stated" : "guessed from the cameras",
+         check.up_disagreement
+             ? fmt::format("; cameras' mean up {:.0f} deg from it", *check.up_disagreement * kDegrees)
+             : "");
+  }
+  if (const auto& origin = sequence.origin()) {
+    line("origin", "latitude {:.7f}, longitude {:.7f}, height {:.2f} m", origin->latitude_deg,
+         origin->longitude_deg, origin->height);
+  }
+  print_poses(check.poses);
+  for (const std::string& warning : check.warnings) line("warning", "{}", warning);
+  for (const std::string& note : sequence.notes()) line("note", "{}", note);
+  for (const io::Skipped& item : sequence.skipped()) line("skipped", "{}: {}", item.file, item.reason);
+}
+
+Status inform_of_sequence(const Arguments& arguments) {
+  io::SequenceOptions options;
+  options.poses = arguments.poses;
+  options.world_up = arguments.world_up;
+  const Result<io::Sequence> sequence = io::Sequence::open(arguments.path, options);
+  if (!sequence) return sequence.error();
+  const Result<SequenceCheck> check = evaluation::check_sequence(*sequence, arguments.step);
+  if (!check) return check.error();
+  if (arguments.json)
+    fmt::print("{}\n", json_of(*sequence, *check).dump(2));
+  else
+    print_sequence(*sequence, *check);
+  return {};
+}
+
+// Both of OctoMap's formats. Its readers build what they can of a damaged file, so the stream is asked
+// afterwards.
+Result<std::unique_ptr<octomap::OcTree>> read_tree(const std::string& path) {
+  const auto refuse = [&path](std::string_view found) {
+    return Error{fmt::format("{}: found {}, expected an OctoMap octree (.bt or .ot)", path, found)};
+  };
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return refuse("a file that cannot be opened");
+  std::string header;
+  std::getline(file, header);
+  file.seekg(0);
+  std::unique_ptr<octomap::OcTree> tree;
+  if (header.starts_with("# Octomap OcTree binary file")) {
+    tree = std::make_unique<octomap::OcTree>(1.0);
+    if (!tree->readBinary(file)) return refuse("a damaged .bt file");
+  } else if (header.starts_with("# Octomap OcTree file")) {
+    std::unique_ptr<octomap::AbstractOcTree> any(octomap::AbstractOcTree::read(file));
+    if (dynamic_cast<octomap::OcTree*>(any.get()) == nullptr)
+      return refuse("a damaged or another kind of .ot file");
+    tree.reset(dynamic_cast<octomap::OcTree*>(any.release()));
+  } else {
+    return refuse("another beginning");
+  }
+  if (file.fail()) return refuse("a file that was cut short");
+  return tree;
+}
+
+struct MapContent {
+  double occupied = 0, free = 0;  // m3
+  std::uint64_t occupied_voxels = 0, free_voxels = 0;
+  Eigen::AlignedBox3d bounds;
+};
+
+MapContent content_of(const octomap::OcTree& tree) {
+  MapContent content;
+  const double voxel = tree.getResolution();
+  for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
+    // A leaf above the lowest level stands for all the voxels in it.
+    const auto voxels = std::uint64_t{1} << 3 * (tree.getTreeDepth() - leaf.getDepth());
+    (tree.isNodeOccupied(*leaf) ? content.occupied_voxels : content.free_voxels) += voxels;
+    const Eigen::Vector3d centre(leaf.getX(), leaf.getY(), leaf.getZ());
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * leaf.getSize());
+    content.bounds.extend(Eigen::AlignedBox3d(centre - half, centre + half));
+  }
+  content.occupied = static_cast<double>(content.occupied_voxels) * voxel * voxel * voxel;
+  content.free = static_cast<double>(content.free_voxels) * voxel * voxel * voxel;
+  return content;
+}
+
+Status inform_of_map(const Arguments& arguments) {
+  const Result<std::unique_ptr<octomap::OcTree>> tree = read_tree(arguments.path);
+  if (!tree) return tree.error();
+  const octomap::OcTree& map = **tree;
+  const MapContent content = content_of(map);
+  const Eigen::AlignedBox3d& bounds = content.bounds;
+  if (arguments.json) {
+    Json json = {{"kind", "map"},
+                 {"file", arguments.path},
+                 {"voxel_m", map.getResolution()},
+                 {"nodes", map.size()},
+                 {"occupied_voxels", content.occupied_voxels},
+                 {"free_voxels", content.free_voxels},
+                 {"occupied_m3", content.occupied},
+                 {"free_m3", content.free},
+                 {"bounds_m", nullptr}};
+    if (!bounds.isEmpty())
+      json["bounds_m"] = {{"from", json_of(bounds.min())}, {"to", json_of(bounds.max())}};
+    fmt::print("{}\n", json.dump(2));
+    return {};
+  }
+  fmt::print("{}: occupancy map with voxels of {:g} m\n", arguments.path, map.getResolution());
+  line("nodes", "{}", map.size());
+  line("occupied", "{} voxels, {:.3f} m3", content.occupied_voxels, content.occupied);
+  line("free", "{} voxels, {:.3f} m3", content.free_voxels, content.free);
+  if (!bounds.isEmpty()) line("bounds", "{} to {} m", vector_text(bounds.min()), vector_text(bounds.max()));
+  return {};
+}
+
+void print_timing(const io::RunTiming& timing) {
+  if (timing.stages.empty()) return;
+  fmt::print("  {:<12} {:>9} {:>9} {:>9} {:>9}\n", "time, ms", "median", "99 %", "largest", "mean");
+  for (const io::StageTiming& stage : timing.stages) {
+    fmt::print("  {:<12} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.2f}\n", stage.stage, stage.p50, stage.p99, stage.max,
+               stage.mean);
+  }
+  line("", "{:.1f} frames/s, peak memory {:.0f} MB", timing.frames_per_second,
+       static_cast<double>(timing.peak_memory) / 1e6);
+}
+
+void print_run(const io::Run& run, const std::optional<evaluation::DepthAccuracy>& accuracy) {
+  const io::RunInfo& info = run.info;
+  fmt::print("{}: run of pade {} on {}\n", run.folder.string(), info.version, info.sequence.string());
+  line("frames", "{} of {} used, {} depth images of {} x {}, poses {}", info.health.frames_used,
+       info.health.frames, info.health.depth_images, info.camera.width, info.camera.height, info.poses);
+  line("options", "{}", info.options);
+  if (info.world_up)
+    line("up", "{} ({})", direction_text(info.world_up->direction),
+         info.world_up->stated ? "stated" : "guessed");
+  if (info.origin)
+    line("origin", "latitude {:.7f}, longitude {:.7f}, height {:.2f} m", info.origin->latitude_deg,
+         info.origin->longitude_deg, info.origin->height);
+  if (info.map)
+    line("map", "{} occupied and {} free voxels of {:g} m", info.map->occupied_voxels, info.map->free_voxels,
+         info.map->voxel);
+  double total = 0;
+  for (const auto pixels : info.state_pixels) total += static_cast<double>(pixels);
+  for (std::size_t i = 0; i < info.state_pixels.size() && total > 0; ++i) {
+    line(i == 0 ? "pixels" : "", "{:5.1f} % {}", 100 * static_cast<double>(info.state_pixels[i]) / total,
+         depth_state_names[i]);
+  }
+  for (const std::string& stack : info.stacks) line("images", "{}/", stack);
+  for (const std::string& warning : info.health.warnings) line("warning", "{}", warning);
+  for (const io::Skipped& item : info.health.skipped) line("skipped", "{}: {}", item.file, item.reason);
+  print_timing(run.timing);
+  if (accuracy) fmt::print("\n{}", evaluation::to_table(*accuracy));
+}
+
+Status inform_of_run(const Arguments& arguments) {
+  const Result<io::Run> run = io::read_run(arguments.path);
+  if (!run) return run.error();
+  const Result<std::optional<evaluation::DepthAccuracy>> accuracy = evaluation::stored_accuracy(*run);
+  if (!accuracy) return accuracy.error();
+  if (!arguments.json) {
+    print_run(*run, *accuracy);
+    return {};
+  }
+  Json json = {{"kind", "run"},
+               {"folder", arguments.path},
+               {"run", Json::parse(io::to_json(run->info))},
+               {"timing", Json::parse(io::to_json(run->timing))},
+               {"evaluation", nullptr}};
+  if (*accuracy) json["evaluation"] = Json::parse(evaluation::to_json(**accuracy));
+  fmt::print("{}\n", json.dump(2));
+  return {};
+}
+
+Status inform(const Arguments& arguments) {
+  const fs::path path = arguments.path;
+  std::error_code code;
+  if (!fs::exists(path, code)) {
+    return Error{fmt::format("{}: found nothing there, expected a sequence, a map (.bt, .ot) or a run",
+                             arguments.path)};
+  }
+  if (!fs::is_directory(path, code)) return inform_of_map(arguments);
+  return fs::exists(path / "run.json", code) ? inform_of_run(arguments) : inform_of_sequence(arguments);
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("info", "Say what is in a sequence, a map or a run, and whether it is sane.");
+  command->footer(
+      "Of a sequence: gaps in time, motion and parallax, which way is up, and whether the poses are in the "
+      "convention\n"
+      "that pade expects (camera to world; camera x right, y down, z forward), tried on the images "
+      "themselves.\n\n"
+      "  pade info flight/          before mapping it\n"
+      "  pade info out/flight       how a run went\n"
+      "  pade info out/flight/map.bt\n");
+  command->add_option("PATH", arguments->path, "Sequence, map (.bt, .ot) or run")->required();
+  command->add_option("--poses", arguments->poses, "groundtruth, original or a pose file")
+      ->capture_default_str();
+  command->add_option("--world-up", arguments->world_up,
+                      "Axis of the pose world that points up: +x -x +y -y +z -z");
+  command->add_option("--step", arguments->step, "Look at each frame and the k-th before it")
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->callback([arguments, &context] {
+    const Status status = inform(*arguments);
+    if (status) return;
+    fmt::print(stderr, "pade info: {}\n", status.error().message);
+    context.exit_code = 1;
+  });
+}
+
+}  // namespace pade::cli
