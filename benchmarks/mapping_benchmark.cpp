@@ -10,7 +10,7 @@
 #include <octomap/OcTree.h>
 
 #include "pade/mapping/back_projection.hpp"
-#include "pade/mapping/map_files.hpp"
+#include "pade/io/map_files.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 #include "pade/simulation/analytic_flights.hpp"
 #include "pade/simulation/analytic_render.hpp"
@@ -121,7 +121,7 @@ void EncodeMap(benchmark::State& state) {
   for (std::size_t i = 0; i < kFrames; ++i) {
     map.integrate(data.images[i], data.flight.camera, data.flight.T_world_camera[i]);
   }
-  for (auto _ : state) benchmark::DoNotOptimize(encode_map(map, MapFormat::bt));
+  for (auto _ : state) benchmark::DoNotOptimize(io::encode_map(map, io::MapFormat::bt));
 }
 BENCHMARK(EncodeMap)->Unit(benchmark::kMillisecond);
 

@@ -14,7 +14,7 @@
 #include <opencv2/core.hpp>
 
 #include "pade/mapping/back_projection.hpp"
-#include "pade/mapping/map_files.hpp"
+#include "pade/io/map_files.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 #include "pade/simulation/analytic_flights.hpp"
 
@@ -206,7 +206,7 @@ TEST(MapUpdate, GivesTheSameBytesAgain) {
   const AnalyticFlight flight = tilted("courtyard");
   const OccupancyMap a = map_of(flight, 0.01);
   const OccupancyMap b = map_of(flight, 0.01);
-  EXPECT_EQ(encode_map(a, MapFormat::ot), encode_map(b, MapFormat::ot));
+  EXPECT_EQ(io::encode_map(a, io::MapFormat::ot), io::encode_map(b, io::MapFormat::ot));
 }
 
 TEST(MapUpdate, ForgetsAnObstacleThatHasGone) {

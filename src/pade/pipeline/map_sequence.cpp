@@ -14,7 +14,7 @@
 #include "pade/evaluation/report.hpp"
 #include "pade/io/cloud_files.hpp"
 #include "pade/io/options_json.hpp"
-#include "pade/mapping/map_files.hpp"
+#include "pade/io/map_files.hpp"
 
 namespace pade {
 namespace {
@@ -168,9 +168,9 @@ class Run {
     const std::string frame = "world frame of " + result.info.poses + " (metres)";
     std::vector<std::pair<std::string, std::string>> files = {
         {"cloud.ply", io::encode_ply(cloud_.cloud(), frame)},
-        {"map.bt", mapping::encode_map(mapper_.map(), mapping::MapFormat::bt)},
-        {"map.ot", mapping::encode_map(mapper_.map(), mapping::MapFormat::ot)},
-        {"map.json", mapping::encode_side_car(options_.mapper.map, result.info.origin)},
+        {"map.bt", io::encode_map(mapper_.map(), io::MapFormat::bt)},
+        {"map.ot", io::encode_map(mapper_.map(), io::MapFormat::ot)},
+        {"map.json", io::encode_side_car(options_.mapper.map, result.info.origin)},
     };
     if (options_.pcd) files.emplace_back("cloud.pcd", io::encode_pcd(cloud_.cloud()));
     if (result.accuracy) {

@@ -1,4 +1,4 @@
-#include "pade/mapping/map_files.hpp"
+#include "pade/io/map_files.hpp"
 
 #include <cmath>
 #include <cstdlib>
@@ -13,8 +13,13 @@
 
 #include "mapping/flown_map.hpp"
 
-namespace pade::mapping {
+namespace pade::io {
 namespace {
+
+using mapping::MapCell;
+using mapping::MapOptions;
+using mapping::Occupancy;
+using mapping::OccupancyMap;
 
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
@@ -155,4 +160,4 @@ TEST(SideCar, CarriesTheGeographicOriginWhereItIsKnown) {
 }
 
 }  // namespace
-}  // namespace pade::mapping
+}  // namespace pade::io

@@ -1,4 +1,4 @@
-#include "pade/mapping/map_files.hpp"
+#include "pade/io/map_files.hpp"
 
 #include <charconv>
 #include <cmath>
@@ -14,7 +14,7 @@
 #include "pade/io/options_json.hpp"
 #include "pade/mapping/map_update.hpp"
 
-namespace pade::mapping {
+namespace pade::io {
 namespace {
 
 constexpr std::string_view kMagicBinary = "# Octomap OcTree binary file";
@@ -145,7 +145,7 @@ class StructureCheck {
 
 }  // namespace
 
-std::string encode_map(const OccupancyMap& map, MapFormat format) {
+std::string encode_map(const mapping::OccupancyMap& map, MapFormat format) {
   // The header is written here, since OctoMap's is in the locale of the stream and writes res with six
   // digits.
   octomap::OcTree tree(map.tree());
@@ -164,7 +164,7 @@ std::string encode_map(const OccupancyMap& map, MapFormat format) {
          data.str();
 }
 
-Result<OccupancyMap> decode_map(std::string_view content, std::string_view file, const MapOptions& options) {
+Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_view file, const mapping::MapOptions& options) {
   const auto header = read_header(content, file);
   if (!header) return header.error();
   if (const Status status = StructureCheck(*header).run(file); !status) return status.error();
@@ -181,19 +181,19 @@ Result<OccupancyMap> decode_map(std::string_view content, std::string_view file,
           fmt::format("{}: {} nodes could be built, expected {}", file, tree->size(), header->nodes)};
     }
   }
-  return OccupancyMap::create(options, std::move(tree));
+  return mapping::OccupancyMap::create(options, std::move(tree));
 }
 
-Status write_map(const OccupancyMap& map, const std::filesystem::path& path, io::Overwrite overwrite) {
+Status write_map(const mapping::OccupancyMap& map, const std::filesystem::path& path, Overwrite overwrite) {
   const std::string extension = path.extension().string();
   if (extension != ".bt" && extension != ".ot") {
     return Error{fmt::format("{}: the name of a map file must end in .bt or .ot", path.string())};
   }
-  return io::write_file(path, encode_map(map, extension == ".bt" ? MapFormat::bt : MapFormat::ot), overwrite);
+  return write_file(path, encode_map(map, extension == ".bt" ? MapFormat::bt : MapFormat::ot), overwrite);
 }
 
-Result<OccupancyMap> read_map(const std::filesystem::path& path, const MapOptions& options) {
-  const auto content = io::read_file(path);
+Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path, const mapping::MapOptions& options) {
+  const auto content = read_file(path);
   if (!content) return content.error();
   return decode_map(*content, path.string(), options);
 }
@@ -202,9 +202,9 @@ std::filesystem::path side_car_of(const std::filesystem::path& map_file) {
   return std::filesystem::path(map_file).replace_extension(".json");
 }
 
-std::string encode_side_car(const MapOptions& options, const std::optional<io::GeographicOrigin>& origin) {
+std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin) {
   nlohmann::ordered_json json;
-  json["options"] = nlohmann::ordered_json::parse(io::to_json(options));
+  json["options"] = nlohmann::ordered_json::parse(to_json(options));
   if (origin) {
     json["geographic_origin"] = {{"datum", "WGS-84"},
                                  {"latitude_deg", origin->latitude_deg},
@@ -216,12 +216,12 @@ std::string encode_side_car(const MapOptions& options, const std::optional<io::G
   return json.dump(2) + "\n";
 }
 
-Result<std::optional<io::GeographicOrigin>> decode_side_car(std::string_view content, std::string_view file) {
+Result<std::optional<GeographicOrigin>> decode_side_car(std::string_view content, std::string_view file) {
   const auto json = nlohmann::json::parse(content, nullptr, false);
   if (!json.is_object()) return Error{fmt::format("{}: not a JSON object", file)};
   const auto found = json.find("geographic_origin");
-  if (found == json.end() || found->is_null()) return std::optional<io::GeographicOrigin>();
-  io::GeographicOrigin origin;
+  if (found == json.end() || found->is_null()) return std::optional<GeographicOrigin>();
+  GeographicOrigin origin;
   for (const auto& [name, value] :
        {std::pair{"latitude_deg", &origin.latitude_deg}, std::pair{"longitude_deg", &origin.longitude_deg},
         std::pair{"height_m", &origin.height}}) {
@@ -233,4 +233,4 @@ Result<std::optional<io::GeographicOrigin>> decode_side_car(std::string_view con
   return std::optional(origin);
 }
 
-}  // namespace pade::mapping
+}  // namespace pade::io
