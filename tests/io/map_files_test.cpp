@@ -16,6 +16,7 @@
 namespace pade::io {
 namespace {
 
+using mapping::map_of;
 using mapping::MapCell;
 using mapping::MapOptions;
 using mapping::Occupancy;

@@ -13,8 +13,8 @@
 #include <octomap/OcTree.h>
 #include <opencv2/core.hpp>
 
-#include "pade/mapping/back_projection.hpp"
 #include "pade/io/map_files.hpp"
+#include "pade/mapping/back_projection.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 #include "pade/simulation/analytic_flights.hpp"
 

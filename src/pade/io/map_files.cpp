@@ -12,7 +12,6 @@
 #include <nlohmann/json.hpp>
 
 #include "pade/io/options_json.hpp"
-#include "pade/mapping/map_update.hpp"
 
 namespace pade::io {
 namespace {
@@ -114,7 +113,7 @@ class StructureCheck {
     const std::uint8_t children = byte();
     ++nodes_;
     if (not_finite_) return false;
-    if (children != 0 && depth == kTreeDepth) return !(too_deep_ = true);
+    if (children != 0 && depth == mapping::kTreeDepth) return !(too_deep_ = true);
     for (unsigned i = 0; i < 8; ++i) {
       if ((children >> i & 1U) != 0 && !full(depth + 1)) return false;
     }
@@ -127,7 +126,7 @@ class StructureCheck {
     unsigned children = byte();
     children |= static_cast<unsigned>(byte()) << 8U;
     ++nodes_;
-    if (children != 0 && depth == kTreeDepth) return !(too_deep_ = true);
+    if (children != 0 && depth == mapping::kTreeDepth) return !(too_deep_ = true);
     for (unsigned i = 0; i < 8; ++i) {
       const unsigned kind = children >> (2 * i) & 3U;
       if (kind == 3 && !binary(depth + 1)) return false;
@@ -164,7 +163,8 @@ std::string encode_map(const mapping::OccupancyMap& map, MapFormat format) {
          data.str();
 }
 
-Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_view file, const mapping::MapOptions& options) {
+Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_view file,
+                                         const mapping::MapOptions& options) {
   const auto header = read_header(content, file);
   if (!header) return header.error();
   if (const Status status = StructureCheck(*header).run(file); !status) return status.error();
@@ -192,7 +192,8 @@ Status write_map(const mapping::OccupancyMap& map, const std::filesystem::path& 
   return write_file(path, encode_map(map, extension == ".bt" ? MapFormat::bt : MapFormat::ot), overwrite);
 }
 
-Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path, const mapping::MapOptions& options) {
+Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path,
+                                       const mapping::MapOptions& options) {
   const auto content = read_file(path);
   if (!content) return content.error();
   return decode_map(*content, path.string(), options);
@@ -202,7 +203,8 @@ std::filesystem::path side_car_of(const std::filesystem::path& map_file) {
   return std::filesystem::path(map_file).replace_extension(".json");
 }
 
-std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin) {
+std::string encode_side_car(const mapping::MapOptions& options,
+                            const std::optional<GeographicOrigin>& origin) {
   nlohmann::ordered_json json;
   json["options"] = nlohmann::ordered_json::parse(to_json(options));
   if (origin) {

@@ -14,7 +14,6 @@
 
 namespace pade::mapping {
 
-inline constexpr unsigned kTreeDepth = 16;
 inline constexpr int kTreeCentre = 32768;  // key of the voxel just above the origin
 
 /// Keys interleaved bit by bit, x lowest: sorting by it walks the octree depth first.

@@ -53,6 +53,8 @@ struct MapOptions {
   }
 };
 
+inline constexpr unsigned kTreeDepth = 16;
+
 enum class Occupancy : std::uint8_t { unknown, free, occupied };
 
 /// A voxel, or a cube of 2^k voxels to a side that all have the same state.
