@@ -367,6 +367,16 @@ TEST_P(EachNoise, ABlankWallAndTheSkyAreNoTextureAndTheEpipoleIsTheEpipole) {
   EXPECT_GT(share(depth, rest, DepthState::measured), 0.7);  // the gates do not simply refuse everything
 }
 
+TEST(DepthStates, WithoutGatesEveryPixelWithAPositiveDepthIsPublished) {
+  const ScenePair pair(simulation::analytic_camera(), {0.2, 0, 0}, Eigen::Vector3d::Zero());
+  DepthOptions all;
+  all.gates = Gates::off;
+  const DepthImage depth = see(pair, all, 1.0).depth;
+  EXPECT_EQ(cv::countNonZero(depth.state == static_cast<int>(DepthState::no_texture)), 0);
+  EXPECT_GT(share(depth, cv::Mat(pair.truth < 15), DepthState::measured),
+            share(see(pair, DepthOptions{}, 1.0).depth, cv::Mat(pair.truth < 15), DepthState::measured));
+}
+
 TEST(DepthStates, TexturedThingsAtInfinityAreLowParallax) {
   // Flow of a textured far field: derotated flow is noise alone.
   const ScenePair pair(kCamera, {0.2, 0, 0}, Eigen::Vector3d::Zero());

@@ -191,13 +191,13 @@ void average(const FlowField& flow, const cv::Mat& gate, int n, double sigma, st
 void DepthEstimator::make_gate(const DepthInput& input) {
   const cv::Size size = input.flow.vectors.size();
   diagnostics_.image_noise = 0;
-  const bool judge =
-      options_.texture_gate > 0 && !input.reference.empty() && size.width >= 3 && size.height >= 3;
+  const bool judge = options_.gates == Gates::on && options_.texture_gate > 0 && !input.reference.empty() &&
+                     size.width >= 3 && size.height >= 3;
   if (judge) {
     diagnostics_.image_noise = image_noise(input.reference, input.other, input.flow);
     gate_ = texture_gate(input.reference, input.other, input.flow, input.camera, input.motion,
                          {options_.texture_gate, options_.texture_correlation}, diagnostics_.image_noise);
-  } else if (gate_.size() != size || cv::countNonZero(gate_) > 0) {
+  } else {
     gate_ = cv::Mat::zeros(size, CV_8UC1);
   }
   if (!input.valid.empty()) gate_.setTo(kOutOfView, input.valid == 0);
