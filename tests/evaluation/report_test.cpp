@@ -60,7 +60,7 @@ TEST(Report, LoadsNothingFromOutside) {
   for (std::sregex_iterator it(html.begin(), html.end(), link), end; it != end; ++it, ++links) {
     EXPECT_THAT((*it)[1].str(), testing::StartsWith("data:image/")) << "outside the page";
   }
-  EXPECT_EQ(links, 1 + 2 * 6 + 2) << "the wheel, six pictures per frame, two views of the map";
+  EXPECT_EQ(links, 1 + 2 * 6 + 3) << "the wheel, six pictures per frame, three views of the map";
   EXPECT_THAT(html, AllOf(Not(HasSubstr("url(")), Not(HasSubstr("<script")), Not(HasSubstr("@import"))));
 }
 

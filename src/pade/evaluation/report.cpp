@@ -243,6 +243,10 @@ std::string map_section(const Report& report) {
   std::string html = "<h2>Map</h2>\n<div class=\"views\">\n";
   html += fmt::format("<figure><figcaption>from above</figcaption>{}</figure>\n", views.top);
   html += fmt::format(
+      "<figure><figcaption>from above, only what is at flight height (0.5 m around "
+      "it)</figcaption>{}</figure>\n",
+      views.slice);
+  html += fmt::format(
       "<figure><figcaption>from the side</figcaption>{}\n<figcaption>height of occupied "
       "voxels</figcaption>{}\n",
       views.side, views.height_bar);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -81,7 +82,24 @@ Interval bounds(const Points& voxels, const Points& path, std::size_t axis, doub
   return {interval.from - margin, interval.to + margin};
 }
 
-// What both views share.
+// On the grid of the map's voxels, so that each row of voxels fills one row of pixels.
+Interval snapped(const Interval& interval, double voxel) {
+  return {std::floor(interval.from / voxel) * voxel, std::ceil(interval.to / voxel) * voxel};
+}
+
+// Voxels between the lowest and the highest point of the path, and half a metre around it.
+Points at_flight_height(const Points& voxels, const Points& path) {
+  constexpr double kAround = 0.5;
+  Interval height;
+  for (const auto& point : path) height.include(point[2]);
+  Points slice;
+  std::copy_if(voxels.begin(), voxels.end(), std::back_inserter(slice), [&](const auto& point) {
+    return point[2] >= height.from - kAround && point[2] <= height.to + kAround;
+  });
+  return slice;
+}
+
+// What the views share.
 struct Scene {
   const Points& voxels;
   const Points& path;
@@ -205,12 +223,17 @@ MapViews draw_map(const MapScene& map) {
   const Points voxels = along(map.occupied, axes);
   const Points path = along(map.trajectory, axes);
   Scene scene{voxels, path, axes, {}, map.voxel};
-  for (std::size_t axis = 0; axis < 3; ++axis) scene.box[axis] = bounds(voxels, path, axis, 3 * map.voxel);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    scene.box[axis] = snapped(bounds(voxels, path, axis, 3 * map.voxel), map.voxel);
+  }
   views.cut_off =
       static_cast<std::size_t>(std::count_if(voxels.begin(), voxels.end(), [&](const auto& point) {
         return !scene.box[0].has(point[0]) || !scene.box[1].has(point[1]) || !scene.box[2].has(point[2]);
       }));
   views.top = View(scene, 0, 1).draw("The map from above", 2, 1);
+  const Points slice = at_flight_height(voxels, path);
+  const Scene level{slice, path, axes, scene.box, map.voxel};
+  views.slice = View(level, 0, 1).draw("The map at flight height, from above", 2, 1);
   // From the side the longer horizontal extent runs across; the viewer stands where the axes stay
   // right-handed.
   const bool first_is_longer = scene.box[0].length() >= scene.box[1].length();

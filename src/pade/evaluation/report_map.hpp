@@ -21,8 +21,9 @@ struct MapScene {
 /// An <svg> per view with axes in metres and a scale bar. Voxels beyond the 0.2 and 99.8 % quantile of each
 /// axis and away from the path are cut off, and counted in the text below. Empty where nothing is occupied.
 struct MapViews {
-  std::string top;         ///< seen from above
-  std::string side;        ///< seen level, along the shorter horizontal extent
+  std::string top;    ///< seen from above
+  std::string slice;  ///< the same, only what is at the height of the path, half a metre around: obstacles
+  std::string side;   ///< seen level, along the shorter horizontal extent
   std::string height_bar;  ///< the colours of both
   std::size_t cut_off = 0;
 };

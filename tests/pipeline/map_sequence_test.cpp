@@ -1,0 +1,147 @@
+#include "pade/pipeline/map_sequence.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <random>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "pade/io/run_reader.hpp"
+#include "pade/io/trajectory.hpp"
+#include "pade/simulation/analytic_flights.hpp"
+#include "pade/simulation/analytic_render.hpp"
+
+namespace pade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// A small flight on the disk in the TUM layout, and a place for runs; removed with the test.
+class MapSequence : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::temp_directory_path() / ("pade_map_sequence_" + std::to_string(std::random_device{}()));
+    fs::create_directories(sequence() / "rgb");
+    fs::create_directories(sequence() / "depth");
+    const auto flight =
+        *simulation::make_analytic_flight("forward", 6, simulation::analytic_camera(160, 120));
+    std::vector<io::StampedPose> poses;
+    for (std::size_t k = 0; k < flight.times.size(); ++k) {
+      const std::string name = to_string(flight.times[k]) + ".png";
+      const Pose& pose = flight.T_world_camera[k];
+      cv::imwrite(sequence() / "rgb" / name, simulation::render_image(flight.scene, flight.camera, pose));
+      cv::Mat depth = simulation::exact_depth(flight.scene, flight.camera, pose);
+      cv::patchNaNs(depth);
+      depth.convertTo(depth, CV_16U, 1000);
+      cv::imwrite(sequence() / "depth" / name, depth);
+      poses.push_back({flight.times[k], pose});
+    }
+    std::ofstream(sequence() / "groundtruth.txt") << io::format_trajectory(poses);
+    const Camera& c = flight.camera;
+    std::ofstream(sequence() / "camera.yaml")
+        << "width: " << c.width << "\nheight: " << c.height << "\nfx: " << c.fx << "\nfy: " << c.fy
+        << "\ncx: " << c.cx << "\ncy: " << c.cy
+        << "\ndistortion_model: none\ndepth_scale: 1000\nworld_up: \"+z\"\n";
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  [[nodiscard]] fs::path sequence() const { return root_ / "flight"; }
+
+  Result<MapResult> map(const std::string& run, const MapSequenceOptions& options = {}, int threads = 1,
+                        const std::function<bool(const MapProgress&)>& progress = {}) const {
+    const auto opened = io::Sequence::open(sequence(), options.sequence);
+    if (!opened) return opened.error();
+    io::RunWriterOptions output;
+    output.image_size = opened->camera().size();
+    output.range_limit = options.mapper.depth.range;
+    output.save = *io::ImageStacks::parse("depth,sigma,state,flow");
+    auto writer = io::RunWriter::create(root_ / run, output);
+    if (!writer) return writer.error();
+    return map_sequence(*opened, options, *writer, threads, progress);
+  }
+
+  /// Content of every file of a run but timing.json and the report, which shows the timing.
+  [[nodiscard]] std::map<std::string, std::string> content(const std::string& run) const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(root_ / run)) {
+      const std::string name = entry.path().lexically_relative(root_ / run);
+      if (!entry.is_regular_file() || name == "timing.json" || name == "report.html") continue;
+      std::ostringstream text;
+      text << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+      files[name] = text.str();
+    }
+    return files;
+  }
+
+  fs::path root_;
+};
+
+TEST_F(MapSequence, WritesEverythingThatTheDesignPromises) {
+  const auto result = map("run");
+  ASSERT_TRUE(result) << result.error().message;
+  for (const char* name :
+       {"run.json", "cloud.ply", "map.bt", "map.ot", "map.json", "trajectory.txt", "timing.json",
+        "evaluation.json", "evaluation.csv", "report.html", "depth/0.100000.png", "sigma/0.500000.png",
+        "state/0.300000.png", "flow/0.200000.png"}) {
+    EXPECT_TRUE(fs::is_regular_file(root_ / "run" / name)) << name;
+  }
+  EXPECT_EQ(result->info.health.frames_used, 6);
+  EXPECT_EQ(result->info.health.depth_images, 5);
+  ASSERT_TRUE(result->accuracy);
+  EXPECT_GT(result->accuracy->all.coverage, 0.5);
+  EXPECT_LT(result->accuracy->all.relative_median, 0.05);
+  EXPECT_GT(result->timing.peak_memory, 1000000U);
+  ASSERT_TRUE(io::read_run(root_ / "run"));
+}
+
+TEST_F(MapSequence, TwiceAndWithTwoThreadsGivesTheSameBytes) {
+  ASSERT_TRUE(map("one"));
+  ASSERT_TRUE(map("again"));
+  ASSERT_TRUE(map("two", {}, 2));
+  const auto one = content("one");
+  EXPECT_GT(one.size(), 25U);
+  EXPECT_EQ(one, content("again"));
+  EXPECT_EQ(one, content("two"));
+}
+
+TEST_F(MapSequence, AnInterruptedRunLeavesNothing) {
+  const auto result = map("run", {}, 1, [](const MapProgress& now) { return now.done < 3; });
+  EXPECT_FALSE(result);
+  int left = 0;
+  for (const auto& entry : fs::directory_iterator(root_)) left += entry.path() != sequence() ? 1 : 0;
+  EXPECT_EQ(left, 0);
+}
+
+TEST_F(MapSequence, OneDamagedImageIsSkippedAndNamedAndMostOfThemAreRefused) {
+  const auto damage = [&](const std::string& name) { fs::resize_file(sequence() / "rgb" / name, 300); };
+  damage("0.200000.png");
+  const auto result = map("run");
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->info.health.frames_used, 5);
+  ASSERT_EQ(result->info.health.skipped.size(), 1U);
+  EXPECT_THAT(result->info.health.skipped[0].file, HasSubstr("0.200000.png"));
+
+  MapSequenceOptions strict;
+  strict.sequence.strict = true;
+  EXPECT_FALSE(map("strict", strict));
+  for (const char* name : {"0.000000.png", "0.300000.png", "0.400000.png"}) damage(name);
+  EXPECT_FALSE(map("refused"));
+  EXPECT_FALSE(fs::exists(root_ / "refused"));
+}
+
+TEST_F(MapSequence, AnExistingRunIsNotTouched) {
+  ASSERT_TRUE(map("run"));
+  const auto before = content("run");
+  const auto result = map("run");
+  ASSERT_FALSE(result);
+  EXPECT_THAT(result.error().message, HasSubstr("run"));
+  EXPECT_EQ(content("run"), before);
+}
+
+}  // namespace
+}  // namespace pade
