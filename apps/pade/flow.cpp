@@ -1,6 +1,7 @@
 // `pade flow`: optical flow between two images, and the comparison of methods on pairs with known flow.
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,7 +12,6 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <sched.h>
-#include <time.h>
 
 #include "pade/core/simd.hpp"
 #include "pade/evaluation/flow_accuracy.hpp"
