@@ -6,6 +6,11 @@ set(pade_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pade)
 
 install(TARGETS pade EXPORT padeTargets COMPONENT libpade-dev)
 install(EXPORT padeTargets NAMESPACE pade:: DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
+if(TARGET pade_simulation)  # find_package(pade COMPONENTS simulation) gives pade::simulation
+  set_target_properties(pade_simulation PROPERTIES EXPORT_NAME simulation)
+  install(TARGETS pade_simulation EXPORT padeSimulationTargets COMPONENT libpade-dev)
+  install(EXPORT padeSimulationTargets NAMESPACE pade:: DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
+endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/pade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libpade-dev
         FILES_MATCHING PATTERN "*.hpp")
 install(FILES ${PROJECT_BINARY_DIR}/generated/pade/core/version.hpp
