@@ -61,7 +61,7 @@ Points along(const Vectors& vectors, const Axes& axes) {
   Points points;
   points.reserve(vectors.size());
   for (const auto& vector : vectors) {
-    const Eigen::Vector3d v = vector.template cast<double>();
+    const Eigen::Vector3d& v = vector.template cast<double>();
     points.push_back({axes.direction[0].dot(v), axes.direction[1].dot(v), axes.direction[2].dot(v)});
   }
   return points;
@@ -105,7 +105,7 @@ struct Scene {
   const Points& path;
   const Axes& axes;
   std::array<Interval, 3> box;
-  double voxel;
+  double voxel = 0;
 };
 
 // One voxel per pixel; of several along the line of sight the one nearest to the viewer, who looks against

@@ -27,6 +27,6 @@ struct MapViews {
   std::string height_bar;  ///< the colours of both
   std::size_t cut_off = 0;
 };
-MapViews draw_map(const MapScene& scene);
+MapViews draw_map(const MapScene& map);
 
 }  // namespace pade::evaluation
