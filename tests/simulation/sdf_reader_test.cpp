@@ -115,10 +115,10 @@ TEST_F(SdfReader, FindsIncludedModelsMeshesAndImages) {
 }
 
 TEST_F(SdfReader, NamesWhatItLeavesOut) {
-  const auto result = read_sdf(
-      world("<light type='point' name='lamp'/><plugin name='p' filename='f'/>" +
-            model(std::string(kBox) +
-                  "<wobble>3</wobble><material><script><uri>file://x.material</uri><name>Gazebo/Grey</name></script></material>")));
+  const auto result =
+      read_sdf(world("<light type='point' name='lamp'/><plugin name='p' filename='f'/>" +
+                     model(std::string(kBox) + "<wobble>3</wobble><material><script><uri>file://x.material</"
+                                               "uri><name>Gazebo/Grey</name></script></material>")));
   ASSERT_TRUE(result.ok()) << message(result);
   EXPECT_THAT(result->warnings, Contains(HasSubstr("<wobble> in <visual>")));
   EXPECT_THAT(result->warnings, Contains(HasSubstr("<plugin>")));

@@ -57,7 +57,7 @@ struct HitPacket {
 struct SurfacePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< unit, toward the side that was asked from
-  TextureFrame texture;    ///< linear about the point
+  TextureFrame texture;                               ///< linear about the point
   std::int32_t visual = 0;
   float sky_view = 1;  ///< 1 - ambient occlusion
 };
