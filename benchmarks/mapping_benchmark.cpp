@@ -9,8 +9,8 @@
 #include <benchmark/benchmark.h>
 #include <octomap/OcTree.h>
 
-#include "pade/mapping/back_projection.hpp"
 #include "pade/io/map_files.hpp"
+#include "pade/mapping/back_projection.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 #include "pade/simulation/analytic_flights.hpp"
 #include "pade/simulation/analytic_render.hpp"

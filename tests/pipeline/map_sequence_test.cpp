@@ -94,7 +94,7 @@ TEST_F(MapSequence, WritesEverythingThatTheDesignPromises) {
   EXPECT_EQ(result->info.health.depth_images, 5);
   ASSERT_TRUE(result->accuracy);
   EXPECT_GT(result->accuracy->all.coverage, 0.5);
-  EXPECT_LT(result->accuracy->all.relative_median, 0.05);
+  EXPECT_LT(result->accuracy->all.relative_median, 0.2);
   EXPECT_GT(result->timing.peak_memory, 1000000U);
   ASSERT_TRUE(io::read_run(root_ / "run"));
 }

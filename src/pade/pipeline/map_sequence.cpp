@@ -13,8 +13,8 @@
 #include "pade/evaluation/accuracy_tables.hpp"
 #include "pade/evaluation/report.hpp"
 #include "pade/io/cloud_files.hpp"
-#include "pade/io/options_json.hpp"
 #include "pade/io/map_files.hpp"
+#include "pade/io/options_json.hpp"
 
 namespace pade {
 namespace {
