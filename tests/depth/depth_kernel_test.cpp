@@ -1,5 +1,6 @@
 #include "pade/depth/depth_kernel.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -168,6 +169,18 @@ TEST(DepthKernel, SumsOfFlowAndGradientsAreTheSameInEveryInstructionSet) {
     std::vector<float> n(kCount);
     PADE_DISPATCH(accumulate_flow_row, set)
     (row.flow.data(), row.gate.data(), kCount, u.data(), v.data(), n.data());
+    for (const int window : {2, 3, 4, 8, 11}) {
+      std::vector<float> sums(kCount / static_cast<std::size_t>(window) + 1);
+      PADE_DISPATCH(sum_columns, set)(n.data(), kCount, window, sums.data());
+      for (std::size_t c = 0; c * static_cast<std::size_t>(window) < kCount; ++c) {
+        float sum = 0;  // whole numbers: exact in any order
+        for (std::size_t i = c * static_cast<std::size_t>(window);
+             i < std::min(kCount, (c + 1) * static_cast<std::size_t>(window)); ++i) {
+          sum += n[i];
+        }
+        EXPECT_EQ(sums[c], sum);
+      }
+    }
     std::vector<std::int32_t> xx(kCount);
     std::vector<std::int32_t> xy(kCount);
     std::vector<std::int32_t> yy(kCount);

@@ -15,7 +15,8 @@ constexpr double kMedianToSigma = 1.4826;
 constexpr double kLeastFlowSigma = 0.01;   // px; no flow method is better, and thresholds need a scale
 constexpr double kUnknownFlowSigma = 0.5;  // px, where too few pixels are left to measure it
 constexpr std::size_t kFewestSamples = 50;
-constexpr int kSampleStep = 4;  // px between the pixels that measure flow noise and focus of expansion
+constexpr double kNoiseSamples = 1500;  // pixels, on a grid, that measure the noise of the flow
+constexpr double kFocusSamples = 4800;  // and that find the focus of expansion
 constexpr double kEpipoleCone =
     0.25;                             // tangent of the angle from the epipole beyond which it is not to blame
 constexpr double kFarthestFocus = 3;  // image diagonals from the centre; beyond, the flow is parallel
@@ -125,6 +126,30 @@ void hide_invalid_matches(const DepthInput& input, const KernelParameters& k, in
   }
 }
 
+/// Of the pixels of a window of which none was used: the weakest reason for which any was left out.
+std::uint8_t weakest_reason(const cv::Mat& gate, cv::Rect window) {
+  double weakest = 0;
+  cv::minMaxLoc(gate(window & cv::Rect({0, 0}, gate.size())), &weakest);
+  return static_cast<std::uint8_t>(weakest);
+}
+
+/// Standard deviation of the mean of the flow vectors of a window, from those of its usable pixels; NaN for
+/// none.
+float sigma_of_mean(const cv::Mat& sigma, const cv::Mat& gate, cv::Rect window) {
+  window &= cv::Rect({0, 0}, sigma.size());
+  float variance = 0;
+  float used = 0;
+  for (int v = window.y; v < window.br().y; ++v) {
+    for (int u = window.x; u < window.br().x; ++u) {
+      const float value = sigma.at<float>(v, u);
+      if (gate.at<std::uint8_t>(v, u) != 0 || !std::isfinite(value)) continue;
+      variance += value * value;
+      used += 1;
+    }
+  }
+  return std::sqrt(variance) / used;
+}
+
 /// Averages flow and gate over n x n windows (paper, Section 2.3.1); invalid and gated flow is left out. The
 /// mean of m vectors with independent noise has 1/m of its variance: from the flow's own sigmas, else from
 /// `sigma` where that is not zero.
@@ -133,55 +158,39 @@ void average(const FlowField& flow, const cv::Mat& gate, int n, double sigma, st
   const cv::Size size((flow.vectors.cols + n - 1) / n, (flow.vectors.rows + n - 1) / n);
   const auto width = static_cast<std::size_t>(flow.vectors.cols);
   const auto accumulate = PADE_DISPATCH(accumulate_flow_row, simd::best());
+  const auto sum_columns = PADE_DISPATCH(sum_columns, simd::best());
   cells.vectors.create(size, CV_32FC2);
   cell_gate.create(size, CV_8UC1);
+  sums.resize(6 * width);
   cells.sigma.release();
   if (!flow.sigma.empty() || sigma > 0) cells.sigma.create(size, CV_32FC1);
   for (int r = 0; r < size.height; ++r) {
-    sums.assign(3 * width, 0.0F);
+    std::fill_n(sums.begin(), 3 * width, 0.0F);
     float* const sum_u = sums.data();
     float* const sum_v = sum_u + width;
     float* const valid = sum_v + width;
+    float* const cell_u = valid + width;
+    float* const cell_v = cell_u + width;
+    float* const cell_valid = cell_v + width;
     const int last = std::min(flow.vectors.rows, (r + 1) * n);
     for (int v = r * n; v < last; ++v) {
       accumulate(flow.vectors.ptr<float>(v), gate.ptr<std::uint8_t>(v), width, sum_u, sum_v, valid);
     }
+    sum_columns(sum_u, width, n, cell_u);
+    sum_columns(sum_v, width, n, cell_v);
+    sum_columns(valid, width, n, cell_valid);
+    auto* const vectors = cells.vectors.ptr<cv::Vec2f>(r);
+    auto* const gates = cell_gate.ptr<std::uint8_t>(r);
     for (int c = 0; c < size.width; ++c) {
-      const auto begin = static_cast<std::size_t>(c * n);
-      const auto end = std::min(width, begin + static_cast<std::size_t>(n));
-      float u = 0;
-      float v = 0;
-      float m = 0;
-      for (std::size_t i = begin; i < end; ++i) {
-        u += sum_u[i];
-        v += sum_v[i];
-        m += valid[i];
-      }
-      cells.vectors.at<cv::Vec2f>(r, c) = {u / m, v / m};  // 0 / 0 is NaN: no flow
-      std::uint8_t reason = 0;
-      if (!(m > 0)) {  // nothing was used: the weakest reason for which any pixel was left out
-        reason = 255;
-        for (int y = r * n; y < last; ++y) {
-          const auto* row = gate.ptr<std::uint8_t>(y);
-          for (std::size_t i = begin; i < end; ++i) reason = std::min(reason, row[i]);
-        }
-      }
-      cell_gate.at<std::uint8_t>(r, c) = reason;
-      if (flow.sigma.empty()) {
-        if (sigma > 0) cells.sigma.at<float>(r, c) = static_cast<float>(sigma) / std::sqrt(m);
-        continue;
-      }
-      float variance = 0;
-      float used = 0;
-      for (int y = r * n; y < last; ++y) {
-        const auto* row = flow.sigma.ptr<float>(y);
-        for (std::size_t i = begin; i < end; ++i) {
-          if (!(gate.at<std::uint8_t>(y, static_cast<int>(i)) == 0) || !std::isfinite(row[i])) continue;
-          variance += row[i] * row[i];
-          used += 1;
-        }
-      }
-      cells.sigma.at<float>(r, c) = std::sqrt(variance) / used;
+      const float m = cell_valid[c];
+      vectors[c] = {cell_u[c] / m, cell_v[c] / m};  // 0 / 0 is NaN: no flow
+      gates[c] = m > 0 ? 0 : weakest_reason(gate, cv::Rect(c * n, r * n, n, n));
+    }
+    if (cells.sigma.empty()) continue;
+    for (int c = 0; c < size.width; ++c) {
+      cells.sigma.at<float>(r, c) = flow.sigma.empty()
+                                        ? static_cast<float>(sigma) / std::sqrt(cell_valid[c])
+                                        : sigma_of_mean(flow.sigma, gate, cv::Rect(c * n, r * n, n, n));
     }
   }
 }
@@ -198,16 +207,17 @@ void DepthEstimator::make_gate(const DepthInput& input) {
     gate_ = texture_gate(input.reference, input.other, input.flow, input.camera, input.motion,
                          {options_.texture_gate, options_.texture_correlation}, diagnostics_.image_noise);
   } else {
-    gate_ = cv::Mat::zeros(size, CV_8UC1);
+    gate_.create(size, CV_8UC1);
+    gate_.setTo(0);
   }
   if (!input.valid.empty()) gate_.setTo(kOutOfView, input.valid == 0);
 }
 
-std::vector<FlowSample> DepthEstimator::sample(const DepthInput& input) const {
+std::vector<FlowSample> DepthEstimator::sample(const DepthInput& input, double wanted) const {
   const bool cells = options_.window > 1;
   const cv::Mat& vectors = cells ? averaged_.vectors : input.flow.vectors;
   const cv::Mat& gate = cells ? cell_gate_ : gate_;
-  const int step = std::max(1, kSampleStep / options_.window);
+  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(vectors.total()) / wanted)));
   const Derotator derotate(input.camera, input.motion, options_.model, input.derotation);
   std::vector<FlowSample> samples;
   samples.reserve(vectors.total() / static_cast<std::size_t>(step * step) + 1);
@@ -239,7 +249,7 @@ void DepthEstimator::estimate(const DepthInput& input, DepthImage& out) {
   if (options_.method == Method::ttc) {
     const double diagonal = std::hypot(input.camera.width, input.camera.height);
     if (std::abs(t.z()) > kLeastForwardShare * t.norm()) {
-      diagnostics_.focus = focus_of_expansion(sample(input), kFarthestFocus * diagonal);
+      diagnostics_.focus = focus_of_expansion(sample(input, kFocusSamples), kFarthestFocus * diagonal);
     }
     if (const auto& focus = diagnostics_.focus) {
       t = t.z() *
@@ -251,7 +261,7 @@ void DepthEstimator::estimate(const DepthInput& input, DepthImage& out) {
       if (options_.flow_sigma <= 0) diagnostics_.flow_sigma = kUnknownFlowSigma;
     }
   } else if (options_.flow_sigma <= 0) {
-    diagnostics_.flow_sigma = across_sigma(sample(input), input.camera, t);
+    diagnostics_.flow_sigma = across_sigma(sample(input, kNoiseSamples), input.camera, t);
   }
   KernelParameters k = kernel_parameters(input, options_, t, diagnostics_.flow_sigma, axis_variance);
   if (options_.method == Method::ttc && !diagnostics_.focus) {

@@ -64,7 +64,7 @@ class DepthEstimator {
 
  private:
   void make_gate(const DepthInput& input);
-  [[nodiscard]] std::vector<FlowSample> sample(const DepthInput& input) const;
+  [[nodiscard]] std::vector<FlowSample> sample(const DepthInput& input, double wanted) const;
 
   DepthOptions options_;
   DepthDiagnostics diagnostics_;

@@ -150,6 +150,18 @@ void choose(const KernelParameters& k, const float* x, float y, const float* flo
   }
 }
 
+/// kN > 0: a constant number of neighbours, which vectorises.
+template <int kN>
+void sum_whole_windows(const float* __restrict in, std::size_t windows, int n, float* __restrict out) {
+  for (std::size_t c = 0; c < windows; ++c) {
+    const int count = kN > 0 ? kN : n;
+    const float* const first = in + c * static_cast<std::size_t>(count);
+    float sum = 0;
+    for (int i = 0; i < count; ++i) sum += first[i];
+    out[c] = sum;
+  }
+}
+
 template <KernelDerotation kDerotation, class... Rest>
 void choose_reading(const KernelParameters& k, Rest... rest) {
   k.samelson ? choose<kDerotation, true>(k, rest...) : choose<kDerotation, false>(k, rest...);
@@ -183,6 +195,25 @@ void accumulate_flow_row(const float* __restrict flow, const std::uint8_t* __res
     sum_v[i] += use ? v : 0.0F;
     valid[i] += use ? 1.0F : 0.0F;
   }
+}
+
+void sum_columns(const float* in, std::size_t width, int n, float* out) {
+  const std::size_t whole = width / static_cast<std::size_t>(n);
+  switch (n) {
+    case 2:
+      sum_whole_windows<2>(in, whole, n, out);
+      break;
+    case 4:
+      sum_whole_windows<4>(in, whole, n, out);
+      break;
+    case 8:
+      sum_whole_windows<8>(in, whole, n, out);
+      break;
+    default:
+      sum_whole_windows<0>(in, whole, n, out);
+  }
+  const std::size_t rest = whole * static_cast<std::size_t>(n);
+  if (rest < width) sum_whole_windows<0>(in + rest, 1, static_cast<int>(width - rest), out + whole);
 }
 
 void accumulate_gradients(const std::int16_t* __restrict gx, const std::int16_t* __restrict gy,

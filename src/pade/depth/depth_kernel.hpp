@@ -54,6 +54,9 @@ PADE_DECLARE_KERNEL(void depth_row(const KernelParameters& k, const float* x, fl
 PADE_DECLARE_KERNEL(void accumulate_flow_row(const float* flow, const std::uint8_t* gate, std::size_t count,
                                              float* sum_u, float* sum_v, float* valid))
 
+/// Sums each n neighbours of a row: out[c] = in[c n] + ... + in[c n + n - 1], the last one of what is left.
+PADE_DECLARE_KERNEL(void sum_columns(const float* in, std::size_t width, int n, float* out))
+
 /// Adds the products of one row of image gradients to the columns of a structure tensor.
 PADE_DECLARE_KERNEL(void accumulate_gradients(const std::int16_t* gx, const std::int16_t* gy,
                                               std::size_t count, std::int32_t* xx, std::int32_t* xy,

@@ -13,8 +13,8 @@ namespace pade::depth {
 namespace {
 
 constexpr std::size_t kFewest = 20;
-constexpr int kHypotheses = 200;
-constexpr int kJudges = 200;
+constexpr int kHypotheses = 100;
+constexpr int kJudges = 100;
 constexpr int kIterations = 15;
 constexpr double kMedianToSigma = 1.4826;
 constexpr double kTukey = 4.685;  // 95 % efficiency on normal noise
