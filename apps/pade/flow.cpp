@@ -26,6 +26,7 @@ namespace pade::cli {
 namespace {
 
 using evaluation::FlowAccuracy;
+using evaluation::FlowConfidenceAccuracy;
 
 struct FlowArguments {
   std::string first;
@@ -42,6 +43,7 @@ struct EvaluateArguments {
   int repetitions = 0;
   bool json = false;
   bool summary = false;
+  std::string confidence = "none";
 };
 
 void refuse(Context& context, const Error& error) {
@@ -120,6 +122,7 @@ struct Timing {
 struct PairResult {
   std::string name;
   FlowAccuracy accuracy;
+  FlowConfidenceAccuracy confidence;
   Timing timing;
 };
 
@@ -185,6 +188,17 @@ FlowAccuracy mean(const std::vector<PairResult>& pairs) {
   return sum;
 }
 
+FlowConfidenceAccuracy mean_confidence(const std::vector<PairResult>& pairs) {
+  FlowConfidenceAccuracy sum;
+  const auto n = static_cast<double>(pairs.size());
+  for (const PairResult& pair : pairs) {
+    sum.kept_endpoint_error += pair.confidence.kept_endpoint_error / n;
+    sum.flagged += pair.confidence.flagged / n;
+    sum.trusted += pair.confidence.trusted / n;
+  }
+  return sum;
+}
+
 // Times are compared at one size: the median over the 640 x 480 pairs where there are any, else over all.
 Timing median_timing(const std::vector<LoadedPair>& loaded, const std::vector<PairResult>& pairs) {
   std::vector<double> vga_times;
@@ -202,11 +216,13 @@ Timing median_timing(const std::vector<LoadedPair>& loaded, const std::vector<Pa
                            : Timing{median(vga_times), median(vga_ratios)};
 }
 
-void print_row(std::string_view method, std::string_view pair, const FlowAccuracy& a, const Timing& t,
-               bool timed) {
+void print_row(std::string_view method, std::string_view pair, const FlowAccuracy& a,
+               const FlowConfidenceAccuracy* c, const Timing& t, bool timed) {
   fmt::print("{:<18} {:<14} {:>7.3f} {:>7.2f} {:>6.1f} {:>6.1f} {:>6.1f} {:>6.1f} {:>6.1f}", method, pair,
              a.endpoint_error, a.angular_error, 100 * a.over_half, 100 * a.over_one, 100 * a.over_three,
              100 * a.outliers, 100 * a.coverage);
+  if (c != nullptr)
+    fmt::print(" {:>7.3f} {:>6.1f} {:>6.1f}", c->kept_endpoint_error, 100 * c->flagged, 100 * c->trusted);
   if (timed) fmt::print(" {:>9.2f} {:>7.3f}", t.milliseconds, t.ratio);
   fmt::print("\n");
 }
@@ -226,6 +242,7 @@ nlohmann::ordered_json to_json(const FlowAccuracy& a, const Timing& t, bool time
 void print(const EvaluateArguments& arguments, const Methods& methods, const std::vector<LoadedPair>& loaded,
            const Results& results) {
   const bool timed = arguments.repetitions > 0;
+  const bool confident = arguments.confidence != "none";
   nlohmann::ordered_json json;
   json["instruction_set"] = simd::name(simd::best());
   if (!arguments.json) {
@@ -235,6 +252,7 @@ void print(const EvaluateArguments& arguments, const Methods& methods, const std
     }
     fmt::print("{:<18} {:<14} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}", "method", "pair", "AEE px",
                "AAE deg", "R0.5 %", "R1 %", "R3 %", "Fl %", "cov %");
+    if (confident) fmt::print(" {:>7} {:>6} {:>6}", "AEE 70%", "flag %", "trust%");
     if (timed) fmt::print(" {:>9} {:>7}", "ms", "ratio");
     fmt::print("\n");
   }
@@ -245,18 +263,27 @@ void print(const EvaluateArguments& arguments, const Methods& methods, const std
     for (const PairResult& pair : pairs) {
       json["methods"][name]["pairs"][pair.name] = to_json(pair.accuracy, pair.timing, timed);
       if (!arguments.json && !arguments.summary)
-        print_row(name, pair.name, pair.accuracy, pair.timing, timed);
+        print_row(name, pair.name, pair.accuracy, confident ? &pair.confidence : nullptr, pair.timing, timed);
     }
     json["methods"][name]["mean"] = to_json(mean(pairs), timing, timed);
-    if (!arguments.json) print_row(name, "mean", mean(pairs), timing, timed);
+    const FlowConfidenceAccuracy confidence = mean_confidence(pairs);
+    if (confident)
+      json["methods"][name]["mean_confidence"] = {
+          {"aee_of_surest_70_percent", confidence.kept_endpoint_error},
+          {"flagged", confidence.flagged},
+          {"trusted", confidence.trusted}};
+    if (!arguments.json)
+      print_row(name, "mean", mean(pairs), confident ? &confidence : nullptr, timing, timed);
   }
   if (arguments.json) fmt::print("{}\n", json.dump(2));
 }
 
 Status evaluate(const EvaluateArguments& arguments) {
+  flow::FlowOptions options;
+  options.confidence = from_name<flow::FlowConfidence>(arguments.confidence).value_or(options.confidence);
   Methods methods;
   for (const std::string& name : arguments.methods) {
-    auto method = flow::make_flow_estimator(name);
+    auto method = flow::make_flow_estimator(name, options);
     if (!method) return method.error();
     methods.push_back(std::move(method.value()));
   }
@@ -270,8 +297,11 @@ Status evaluate(const EvaluateArguments& arguments) {
     for (const auto& method : methods) {
       const std::string name(method->name());
       const FlowField field = method->estimate(pair.first, pair.second);
+      FlowConfidenceAccuracy confidence{};
+      if (!field.sigma.empty())
+        confidence = evaluation::flow_confidence_accuracy(field.vectors, field.sigma, pair.truth);
       results[name].push_back(
-          {pair.name, evaluation::flow_accuracy(field.vectors, pair.truth), timings[name]});
+          {pair.name, evaluation::flow_accuracy(field.vectors, pair.truth), confidence, timings[name]});
     }
   }
   print(arguments, methods, *loaded, results);
@@ -304,6 +334,13 @@ void add_flow(CLI::App& app, Context& context) {
       ->required();
   evaluation->add_option("--repeat", choice->repetitions,
                          "also measure times: repetitions, pinned to one core (0 = no times)");
+  evaluation
+      ->add_option(
+          "--confidence", choice->confidence,
+          "also judge sigma: error of the surest 70 %, share of errors > 3 px flagged (sigma > 1 px), share "
+          "of the others trusted")
+      ->check(CLI::IsMember({"none", "local", "forward_backward"}))
+      ->capture_default_str();
   evaluation->add_flag("--mean", choice->summary, "only the mean over the pairs");
   evaluation->add_flag("--json", choice->json, "print JSON");
 

@@ -59,5 +59,22 @@ TEST(FlowAccuracy, WithoutAnyTruthIsNotANumber) {
   EXPECT_TRUE(std::isnan(flow_accuracy(truth, truth).endpoint_error));
 }
 
+TEST(FlowConfidenceAccuracy, OfAPerfectSigmaKeepsTheRightPixels) {
+  const cv::Mat truth(10, 10, CV_32FC2, cv::Scalar(0, 0));
+  cv::Mat estimate = truth.clone();
+  estimate.rowRange(0, 2) = cv::Scalar(5, 0);  // a fifth is wrong
+  cv::Mat sigma(10, 10, CV_32FC1, cv::Scalar(0.1));
+  sigma.rowRange(0, 2) = 4;
+  const FlowConfidenceAccuracy good = flow_confidence_accuracy(estimate, sigma, truth);
+  EXPECT_EQ(good.kept_endpoint_error, 0);
+  EXPECT_EQ(good.flagged, 1);
+  EXPECT_EQ(good.trusted, 1);
+  sigma = 4.1 - sigma;  // upside down
+  const FlowConfidenceAccuracy bad = flow_confidence_accuracy(estimate, sigma, truth);
+  EXPECT_NEAR(bad.kept_endpoint_error, 5 * 20.0 / 70, 1e-6);
+  EXPECT_EQ(bad.flagged, 0);
+  EXPECT_EQ(bad.trusted, 0);
+}
+
 }  // namespace
 }  // namespace pade::evaluation

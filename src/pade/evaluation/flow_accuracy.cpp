@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 namespace pade::evaluation {
 namespace {
@@ -65,6 +67,38 @@ cv::Mat endpoint_errors(const cv::Mat& estimate, const cv::Mat& truth) {
     }
   }
   return errors;
+}
+
+FlowConfidenceAccuracy flow_confidence_accuracy(const cv::Mat& estimate, const cv::Mat& sigma,
+                                                const cv::Mat& truth) {
+  CV_Assert(sigma.type() == CV_32FC1 && sigma.size() == truth.size());
+  constexpr float kWrong = 3;
+  constexpr float kDoubtful = 1;
+  constexpr double kKept = 0.7;
+  const cv::Mat errors = endpoint_errors(estimate, truth);
+  std::vector<std::pair<float, float>> pixels;  // sigma, error
+  double wrong = 0;
+  double right = 0;
+  FlowConfidenceAccuracy result;
+  for (int v = 0; v < errors.rows; ++v) {
+    for (int u = 0; u < errors.cols; ++u) {
+      const float error = errors.at<float>(v, u);
+      if (std::isnan(error)) continue;
+      const float deviation = sigma.at<float>(v, u);
+      const bool doubtful = !(deviation <= kDoubtful);
+      pixels.emplace_back(std::isnan(deviation) ? std::numeric_limits<float>::infinity() : deviation, error);
+      (error > kWrong ? wrong : right) += 1;
+      result.flagged += error > kWrong && doubtful ? 1 : 0;
+      result.trusted += error <= kWrong && !doubtful ? 1 : 0;
+    }
+  }
+  std::sort(pixels.begin(), pixels.end());
+  const auto kept = static_cast<std::size_t>(kKept * static_cast<double>(pixels.size()));
+  for (std::size_t i = 0; i < kept; ++i) result.kept_endpoint_error += static_cast<double>(pixels[i].second);
+  result.kept_endpoint_error /= kept > 0 ? static_cast<double>(kept) : kNone;
+  result.flagged /= wrong > 0 ? wrong : kNone;
+  result.trusted /= right > 0 ? right : kNone;
+  return result;
 }
 
 }  // namespace pade::evaluation

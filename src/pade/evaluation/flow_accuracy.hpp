@@ -25,6 +25,17 @@ struct FlowAccuracy {
 /// @param estimate, truth  CV_32FC2 of one size, pixels, NaN = unknown (truth beyond 1e9 is unknown too).
 FlowAccuracy flow_accuracy(const cv::Mat& estimate, const cv::Mat& truth);
 
+/// Whether a flow's standard deviations know where it is wrong.
+struct FlowConfidenceAccuracy {
+  double kept_endpoint_error = 0;  ///< AEE of the 70 % of compared pixels with the smallest sigma, pixels
+  double flagged = 0;  ///< of the pixels more than 3 px off, the share with sigma > 1 px; NaN where none
+  double trusted = 0;  ///< of the others, the share with sigma <= 1 px
+};
+
+/// @param estimate, truth  as for flow_accuracy(). @param sigma  CV_32FC1 of their size, pixels.
+FlowConfidenceAccuracy flow_confidence_accuracy(const cv::Mat& estimate, const cv::Mat& sigma,
+                                                const cv::Mat& truth);
+
 /// End-point error per pixel, CV_32FC1; NaN where truth or estimate is unknown.
 cv::Mat endpoint_errors(const cv::Mat& estimate, const cv::Mat& truth);
 

@@ -7,27 +7,10 @@
 
 #include "pade/flow/kernels/clg_kernels.hpp"
 #include "pade/flow/pyramid_flow.hpp"
+#include "pade/flow/split_plane.hpp"
 
 namespace pade::flow {
 namespace {
-
-// Memory of a SplitView, all zero but for what kernels write between the guards.
-class SplitPlane {
- public:
-  void resize(int width, int height) {
-    if (view_.half == padded(width) / 2 && view_.height == height) return;
-    view_.half = padded(width) / 2;
-    view_.height = height;
-    memory_.assign(static_cast<std::size_t>(view_.stride()) * static_cast<std::size_t>(height + 2) + 16,
-                   0.0F);
-    view_.data = memory_.data();
-  }
-  [[nodiscard]] const SplitView& view() const { return view_; }
-
- private:
-  SplitView view_;
-  std::vector<float> memory_;
-};
 
 // Everything that one pyramid level needs, kept between frames.
 struct LevelMemory {

@@ -1,8 +1,6 @@
 #include "pade/flow/lucas_kanade.hpp"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,11 +11,6 @@
 
 namespace pade::flow {
 namespace {
-
-std::vector<float> local_mean_taps(double sigma) {
-  if (sigma <= 0) return {};
-  return gaussian_taps(sigma, std::clamp(static_cast<int>(std::lround(2 * sigma)), 1, kLargestSmoothRadius));
-}
 
 class LucasKanade final : public PyramidFlow {
  public:

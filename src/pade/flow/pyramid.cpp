@@ -48,6 +48,19 @@ std::vector<float> gaussian_taps(double sigma, int radius) {
   return taps;
 }
 
+std::vector<float> local_mean_taps(double sigma) {
+  if (sigma <= 0) return {};
+  return gaussian_taps(sigma, std::clamp(static_cast<int>(std::lround(2 * sigma)), 1, kLargestSmoothRadius));
+}
+
+double effective_window(const std::vector<float>& taps) {
+  double squares = 0;
+  for (std::size_t i = 0; i < taps.size(); ++i) {
+    squares += (i == 0 ? 1.0 : 2.0) * static_cast<double>(taps[i]) * static_cast<double>(taps[i]);
+  }
+  return 1 / (squares * squares);  // the two-dimensional sum is the square of the one-dimensional one
+}
+
 void FlowPlanes::resize(int width, int height) {
   u.resize(width, height);
   v.resize(width, height);

@@ -25,6 +25,12 @@ int pyramid_levels(cv::Size size, int smallest);
 /// to radius.
 std::vector<float> gaussian_taps(double sigma, int radius);
 
+/// The Gaussian window of a local mean with this standard deviation, as far as smooth() reaches; empty for 0.
+std::vector<float> local_mean_taps(double sigma);
+
+/// Number of independent pixels in the separable window of these taps: 1 / sum of squared weights.
+double effective_window(const std::vector<float>& taps);
+
 /// The flow of one level.
 struct FlowPlanes {
   Plane u;

@@ -110,12 +110,7 @@ cv::Mat PyramidFlow::sigma(int from, int to) {
   input.taps = sigma_taps_.data();
   input.radius = kSigmaRadius;
   input.noise = kGreyNoise;
-  double squares = 0;  // of the two-dimensional window: the square of the one-dimensional sum
-  for (std::size_t i = 0; i < sigma_taps_.size(); ++i) {
-    squares +=
-        (i == 0 ? 1.0 : 2.0) * static_cast<double>(sigma_taps_[i]) * static_cast<double>(sigma_taps_[i]);
-  }
-  input.effective_size = static_cast<float>(1 / (squares * squares));
+  input.effective_size = static_cast<float>(effective_window(sigma_taps_));
   over_rows(input.first.height, [&](int first, int last, float* scratch) {
     PADE_DISPATCH(flow_sigma, isa_)(input, first, last, scratch);
   });

@@ -1,5 +1,7 @@
 #include "pade/io/flow_file.hpp"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -50,6 +52,39 @@ Status write_bytes(const std::filesystem::path& file, const std::vector<std::uin
   return {};
 }
 
+std::uint64_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | bytes[at + i];
+  return value;
+}
+
+// Whether the bytes can be a PNG of 16-bit RGB at all. OpenCV's decoder would take any format, and believe
+// any size.
+Status check_png_header(std::span<const std::uint8_t> bytes, std::string_view name) {
+  constexpr std::array<std::uint8_t, 16> start = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n',
+                                                  0,    0,   0,   13,  'I',  'H',  'D',  'R'};
+  constexpr std::size_t header_bytes = 33;
+  if (bytes.size() < header_bytes || !std::equal(start.begin(), start.end(), bytes.begin())) {
+    return Error{fmt::format("{}: not a readable PNG", name)};
+  }
+  const std::uint64_t width = big_endian(bytes, 16);
+  const std::uint64_t height = big_endian(bytes, 20);
+  const int depth = bytes[24];
+  const int color = bytes[25];
+  if (depth != 16 || color != 2) {
+    return Error{
+        fmt::format("{}: PNG of colour type {} with {} bits, expected a KITTI flow PNG (type 2, 16 bits)",
+                    name, color, depth)};
+  }
+  constexpr std::uint64_t best_compression = 1040;  // what deflate can reach
+  if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide ||
+      width * height * 6 > bytes.size() * best_compression) {
+    return Error{fmt::format("{}: size {} x {}, more than its {} bytes can hold or beyond {}", name, width,
+                             height, bytes.size(), kLargestSide)};
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<cv::Mat> decode_flo(std::span<const std::uint8_t> bytes, std::string_view name) {
@@ -97,13 +132,11 @@ std::vector<std::uint8_t> encode_flo(const cv::Mat& vectors) {
 }
 
 Result<cv::Mat> decode_kitti_flow(std::span<const std::uint8_t> bytes, std::string_view name) {
+  if (const Status header = check_png_header(bytes, name); !header) return header.error();
   cv::Mat png;
-  try {  // the decoder throws on absurd sizes
-    if (!bytes.empty()) {
-      const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1,
-                           const_cast<std::uint8_t*>(bytes.data()));
-      png = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-    }
+  try {  // the decoder may throw
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<std::uint8_t*>(bytes.data()));
+    png = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception& failure) {
     return Error{fmt::format("{}: {}", name, failure.err)};
   }
