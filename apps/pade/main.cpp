@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   pade::cli::add_info(app, context);
   pade::cli::add_sample(app, context);
   pade::cli::add_flow(app, context);
+  pade::cli::add_simulate(app, context);
   pade::cli::add_completion(app, context);
   CLI11_PARSE(app, argc, argv);
   return context.exit_code;

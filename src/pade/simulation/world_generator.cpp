@@ -190,9 +190,14 @@ WorldFiles Generator::building() {
     const double y = -15 + 4 * i + random_.uniform(-1, 1);
     if (std::abs(y - 3) > 1.2) tree({random_.uniform(23.2, 24.2), y, 0}, random_.uniform(0.4, 0.6));
   }
-  for (int i = 0; i < 12; ++i) {
-    const double y = (i % 2 == 0 ? 1 : -1) * random_.uniform(2.4, 9) + 3;
-    tree({random_.uniform(-2, 18), y + (y > 3 ? 1.0 : -1.0), 0}, random_.uniform(0.6, 1.0));
+  for (int i = 0; i < 14; ++i) {
+    const double side = i % 2 == 0 ? 1 : -1;
+    const double x = random_.uniform(-2, 18);
+    const double y = 3 + side * random_.uniform(3.4, 10);
+    const double scale = random_.uniform(0.6, 1.0);
+    const double from_diagonal =
+        std::abs(0.7 * (x - 4) + 0.68 * (y - 16.5));  // a lane of the paper's flights
+    if (from_diagonal > 1.6) tree({x, y, 0}, scale);
   }
   for (int i = 0; i < 24; ++i) {
     const double angle = random_.uniform(0.25 * kPi, 1.75 * kPi);

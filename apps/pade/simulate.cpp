@@ -1,0 +1,231 @@
+// `pade simulate`: flights through simulated worlds, written as sequences with exact truth.
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "pade/core/result.hpp"
+
+#include "commands.hpp"
+
+#ifdef PADE_HAS_SIMULATION
+#include "pade/io/atomic_output.hpp"
+#include "pade/simulation/paper_set.hpp"
+#include "pade/simulation/sdf_reader.hpp"
+#include "pade/simulation/simulated_sequence.hpp"
+#include "pade/simulation/world_generator.hpp"
+
+#include "progress.hpp"
+#endif
+
+namespace pade::cli {
+namespace {
+
+struct SimulateArguments {
+  std::string world;
+  std::string flight;
+  std::string out;
+  std::string random;
+  std::string write_world;
+  std::string set;
+  std::vector<std::string> resources;
+  std::vector<std::string> save;
+  std::uint64_t seed = 1;
+  int threads = 1;
+  int samples = 4;
+  int every = 1;
+  bool preview = false;
+  bool colour = false;
+  bool quick = false;
+  bool force = false;
+};
+
+#ifdef PADE_HAS_SIMULATION
+
+namespace fs = std::filesystem;
+using namespace pade::simulation;
+
+SequenceOptions sequence_options(const SimulateArguments& arguments) {
+  SequenceOptions options;
+  options.seed = arguments.seed;
+  if (arguments.preview) options.render = RenderOptions::preview();
+  if (!arguments.preview) options.render.samples = arguments.samples;
+  options.threads = arguments.threads;
+  options.every = arguments.every;
+  options.save_flow = std::find(arguments.save.begin(), arguments.save.end(), "flow") != arguments.save.end();
+  options.overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
+  return options;
+}
+
+Result<Scene> load_scene(const fs::path& file, const SimulateArguments& arguments) {
+  auto world = read_sdf(file, {arguments.resources.begin(), arguments.resources.end()});
+  if (!world) return world.error();
+  for (const std::string& warning : world->warnings)
+    fmt::print(stderr, "pade simulate: warning: {}\n", warning);
+  return Scene::build(std::move(world).value());
+}
+
+Status render(const Scene& scene, Flight flight, const fs::path& out, const SimulateArguments& arguments,
+              const SequenceOptions& options, const std::string& label) {
+  if (arguments.colour) flight.image.colour = true;
+  std::optional<Progress> line;
+  int known = 0;
+  return write_sequence(scene, flight, out, options, [&](int done, int total) {
+    if (!line) line.emplace("Rendering " + label, static_cast<std::size_t>(total));
+    for (; known < done; ++known) line->step();
+  });
+}
+
+/// The flight that suits a generated world: the paper's through it.
+Flight default_flight(WorldKind kind) {
+  for (const PaperSequence& sequence : paper_sequences(1)) {
+    if (sequence.world == kind && (kind != WorldKind::building || sequence.name == "approach"))
+      return sequence.flight;
+  }
+  return {};
+}
+
+fs::path default_cache() {
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
+    return fs::path(cache) / "pade";
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+    return fs::path(home) / ".cache" / "pade";
+  return fs::path("pade-cache");
+}
+
+Status simulate_set(const SimulateArguments& arguments) {
+  if (arguments.set != "paper") return Error{fmt::format("--set: found '{}', expected paper", arguments.set)};
+  const fs::path folder =
+      arguments.out.empty()
+          ? default_cache() / fmt::format("paper-{}{}", arguments.seed, arguments.quick ? "-quick" : "")
+          : fs::path(arguments.out);
+  SequenceOptions options = sequence_options(arguments);
+  options.keep_finished = true;
+  const auto sequences = paper_sequences(arguments.seed, arguments.quick);
+  for (std::size_t i = 0; i < sequences.size(); ++i) {
+    const PaperSequence& sequence = sequences[i];
+    const fs::path file = folder / "worlds" / sequence.name / (std::string(to_name(sequence.world)) + ".sdf");
+    if (const Status s = write_world(generate_world(sequence.world, sequence.world_seed), file); !s) return s;
+    const auto scene = load_scene(file, arguments);
+    if (!scene) return scene.error();
+    const std::string label = fmt::format("{} ({} of {})", sequence.name, i + 1, sequences.size());
+    if (const Status s = render(*scene, sequence.flight, folder / sequence.name, arguments, options, label);
+        !s)
+      return s;
+  }
+  fmt::print("{}\n", folder.string());
+  return {};
+}
+
+Status simulate(const SimulateArguments& arguments) {
+  if (!arguments.set.empty()) return simulate_set(arguments);
+  std::optional<WorldKind> kind;
+  fs::path file = arguments.world;
+  if (!arguments.random.empty()) {
+    kind = from_name<WorldKind>(arguments.random);
+    if (!kind)
+      return Error{fmt::format("--random: found '{}', expected building, street, forest, rubble or corridor",
+                               arguments.random)};
+    file = arguments.write_world.empty()
+               ? default_cache() / "worlds" / fmt::format("{}-{}", arguments.random, arguments.seed) /
+                     (arguments.random + ".sdf")
+               : fs::path(arguments.write_world);
+    if (const Status s = write_world(generate_world(*kind, arguments.seed), file); !s) return s;
+    if (!arguments.write_world.empty() && arguments.out.empty()) return {};
+  }
+  if (file.empty()) return Error{"no world: name an SDF file, --random KIND or --set paper"};
+  if (arguments.out.empty()) return Error{"--out: found nothing, expected the folder of the new sequence"};
+  if (arguments.flight.empty() && !kind)
+    return Error{"--flight: found nothing, expected a flight file (docs/simulator.md)"};
+  Flight flight;
+  if (arguments.flight.empty()) {
+    flight = default_flight(*kind);
+  } else {
+    auto read = read_flight(arguments.flight);
+    if (!read) return read.error();
+    flight = std::move(read).value();
+  }
+  const auto scene = load_scene(file, arguments);
+  if (!scene) return scene.error();
+  if (const Status s =
+          render(*scene, flight, arguments.out, arguments, sequence_options(arguments), flight.name);
+      !s)
+    return s;
+  fmt::print("{}\n", arguments.out);
+  return {};
+}
+
+#else
+
+Status simulate(const SimulateArguments&) {
+  return Error{fmt::format("this build has no simulator: {}",
+                           std::string_view(PADE_SIMULATION_MISSING).empty()
+                               ? "it was configured with -DPADE_BUILD_SIMULATION=OFF"
+                               : "missing were " PADE_SIMULATION_MISSING
+                                 "; install them, then configure and build again")};
+}
+
+#endif
+
+}  // namespace
+
+void add_simulate(CLI::App& app, Context& context) {
+  auto* command = app.add_subcommand(
+      "simulate", "Fly through a simulated world: images, exact depth and poses, IMU and GNSS");
+  command->footer(
+      "Examples:\n"
+      "  pade simulate worlds/building/building.sdf --flight config/flights/building.yaml -o flight\n"
+      "  pade simulate --random forest --seed 7 -o forest7\n"
+      "  pade simulate --set paper --quick            the ten sequences of the experiments, a tenth of the "
+      "frames\n"
+      "A run that was cut short goes on where it stopped. docs/simulator.md: how to write worlds and "
+      "flights.");
+  auto arguments = std::make_shared<SimulateArguments>();
+  command->add_option("world", arguments->world, "Gazebo world (SDF 1.0 to 1.9)");
+  command->add_option("--flight", arguments->flight, "flight file (YAML)");
+  command->add_option("--out,-o", arguments->out,
+                      "folder of the new sequence; with --set: of all (default: the user's cache)");
+  command->add_option("--random", arguments->random,
+                      "make the world: building, street, forest, rubble or corridor");
+  command->add_option("--seed", arguments->seed,
+                      "changes the random world, the image noise and the sensors' errors");
+  command->add_option("--write-world", arguments->write_world,
+                      "write the random world to this SDF file (alone: without a flight)");
+  command->add_option("--set", arguments->set, "paper: the ten sequences, 1038 frames, of the experiments");
+  command->add_flag("--quick", arguments->quick, "with --set: a tenth of the frames");
+  command->add_option("--resource-path", arguments->resources, "folders with models, meshes and images");
+  command->add_option("--samples", arguments->samples, "rays per pixel")
+      ->check(CLI::Range(1, 16))
+      ->capture_default_str();
+  command->add_flag("--preview", arguments->preview, "one ray per pixel, no ambient occlusion");
+  command->add_flag("--colour", arguments->colour, "colour images");
+  command->add_option("--every", arguments->every, "only each n-th frame")->check(CLI::Range(1, 1000000));
+  command
+      ->add_option("--save", arguments->save,
+                   "flow: exact flow and visibility to the next and the previous frame")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"flow"}));
+  command->add_option("--threads", arguments->threads, "the result is the same for any number")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command->add_flag("--force", arguments->force, "replace an existing sequence");
+  command->callback([arguments, &context] {
+#ifdef PADE_HAS_SIMULATION
+    io::watch_for_interrupts();
+#endif
+    if (const Status status = simulate(*arguments); !status) {
+      fmt::print(stderr, "pade simulate: {}\n", status.error().message);
+      context.exit_code = 1;
+#ifdef PADE_HAS_SIMULATION
+      if (io::interrupted()) context.exit_code = 130;
+#endif
+    }
+  });
+}
+
+}  // namespace pade::cli
