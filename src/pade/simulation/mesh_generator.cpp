@@ -31,10 +31,12 @@ class ObjText {
 void tube(ObjText& out, const std::vector<Eigen::Vector3d>& path, double from_radius, double to_radius,
           int sides) {
   std::vector<int> before;
+  Eigen::Vector3d x = Eigen::Vector3d::UnitX();  // carried along, so that the rings do not twist
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Eigen::Vector3d along =
         (path[std::min(i + 1, path.size() - 1)] - path[i > 0 ? i - 1 : 0]).normalized();
-    const Eigen::Vector3d x = along.unitOrthogonal();
+    x -= along * along.dot(x);
+    x = x.norm() > 0.1 ? Eigen::Vector3d(x.normalized()) : along.unitOrthogonal();
     const Eigen::Vector3d y = along.cross(x);
     const double radius = from_radius + (to_radius - from_radius) * static_cast<double>(i) /
                                             static_cast<double>(path.size() - 1);

@@ -114,9 +114,9 @@ float at(const cv::Mat& noise, int x, int y) { return noise.at<float>(y, x); }
 
 PatternTile plaster() {
   const cv::Mat stains = draw_noise(kPixels, 3, 3, 4, 0.5F, 1);
-  const cv::Mat grain = draw_noise(kPixels, 128, 128, 3, 0.7F, 2);
+  const cv::Mat grain = draw_noise(kPixels, 32, 32, 5, 0.85F, 2);  // trowel marks and sand
   return paint(4, [&](int x, int y) {
-    const float tone = 1 + 0.05F * at(stains, x, y) + 0.05F * at(grain, x, y);
+    const float tone = 1 + 0.09F * at(stains, x, y) + 0.13F * at(grain, x, y);
     return tone * Colour(0.68F, 0.64F, 0.56F);
   });
 }
@@ -166,11 +166,11 @@ PatternTile grass() {
 
 PatternTile concrete() {
   const cv::Mat stains = draw_noise(kPixels, 3, 4, 6, 0.6F, 12);
-  const cv::Mat grain = draw_noise(kPixels, 128, 128, 3, 0.8F, 13);
+  const cv::Mat grain = draw_noise(kPixels, 32, 32, 5, 0.85F, 13);
   return paint(4, [&](int x, int y) {
     const bool seam = x % (kPixels / 2) < 2 || y % (kPixels / 4) < 2;  // formwork: 2 m x 1 m
     const float pit = random_at(x / 3, y / 3, 14) > 0.9985F ? 0.6F : 1;
-    const float tone = (1 + 0.12F * at(stains, x, y) + 0.06F * at(grain, x, y)) * (seam ? 0.75F : 1) * pit;
+    const float tone = (1 + 0.16F * at(stains, x, y) + 0.17F * at(grain, x, y)) * (seam ? 0.75F : 1) * pit;
     return tone * Colour(0.44F, 0.43F, 0.41F);
   });
 }
@@ -190,10 +190,10 @@ PatternTile gravel() {
 
 PatternTile asphalt() {
   const cv::Mat patches = draw_noise(kPixels, 3, 3, 5, 0.6F, 19);
-  const cv::Mat grain = draw_noise(kPixels, 256, 256, 2, 0.9F, 20);
+  const cv::Mat grain = draw_noise(kPixels, 64, 64, 4, 0.95F, 20);
   return paint(4, [&](int x, int y) {
     const float chip = random_at(x / 2, y / 2, 21) > 0.97F ? 1.7F : 1;
-    const float tone = (1 + 0.18F * at(patches, x, y) + 0.22F * at(grain, x, y)) * chip;
+    const float tone = (1 + 0.22F * at(patches, x, y) + 0.34F * at(grain, x, y)) * chip;
     return tone * Colour(0.13F, 0.13F, 0.135F);
   });
 }
