@@ -11,7 +11,6 @@
 namespace pade::simulation {
 namespace {
 
-constexpr float kFullScale = 65535;
 constexpr int kMostTaps = 8;
 
 int power_of_two(int pixels) {
@@ -33,10 +32,8 @@ Texture::Texture(const cv::Mat& pixels, const Eigen::Vector2f& size) {
     for (int y = 0; y < image.rows; ++y) {
       for (int x = 0; x < image.cols; ++x) {
         const auto& p = image.at<cv::Vec3f>(y, x);
-        const auto quantised = [](float value) {
-          return static_cast<std::uint16_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * kFullScale));
-        };
-        level.texels.emplace_back(quantised(p[0]), quantised(p[1]), quantised(p[2]), std::uint16_t{0});
+        level.texels.emplace_back(std::clamp(p[0], 0.0F, 1.0F), std::clamp(p[1], 0.0F, 1.0F),
+                                  std::clamp(p[2], 0.0F, 1.0F), 0.0F);
       }
     }
     levels_.push_back(std::move(level));
@@ -83,8 +80,8 @@ Eigen::Array4f Texture::bilinear(const Level& level, float x, float y) {
   const int y0 = static_cast<int>(top) & (level.height - 1);
   const int x1 = (x0 + 1) & (level.width - 1);
   const int y1 = (y0 + 1) & (level.height - 1);
-  const auto texel = [&](int column, int row) -> Eigen::Array4f {
-    return level.texels[static_cast<std::size_t>(row * level.width + column)].cast<float>();
+  const auto texel = [&](int column, int row) -> const Texel& {
+    return level.texels[static_cast<std::size_t>(row * level.width + column)];
   };
   return (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x1, y0)) +
          fy * ((1 - fx) * texel(x0, y1) + fx * texel(x1, y1));
@@ -119,11 +116,9 @@ Eigen::Array3f Texture::sample(const Eigen::Vector2f& at, const Eigen::Vector2f&
     sum += (1 - blend) * value(fine);
     if (blend > 0) sum += blend * value(coarse);
   }
-  return (sum / (static_cast<float>(taps) * kFullScale)).head<3>();
+  return (sum / static_cast<float>(taps)).head<3>();
 }
 
-Eigen::Array3f Texture::mean() const {
-  return levels_.back().texels.front().cast<float>().head<3>() / kFullScale;
-}
+Eigen::Array3f Texture::mean() const { return levels_.back().texels.front().head<3>(); }
 
 }  // namespace pade::simulation

@@ -32,7 +32,7 @@ class Texture {
   [[nodiscard]] Eigen::Array3f mean() const;
 
  private:
-  using Texel = Eigen::Array<std::uint16_t, 4, 1>;
+  using Texel = Eigen::Array4f;  // RGB and a spare: one aligned load
   struct Level {
     int width = 1;
     int height = 1;
