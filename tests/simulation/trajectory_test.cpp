@@ -136,6 +136,10 @@ TEST(Trajectory, RefusesWhatTheVehicleCannotFly) {
   EXPECT_THAT(refused(slalom(), gentle), testing::HasSubstr("acceleration between waypoints"));
   EXPECT_THAT(refused({slalom()[0]}, {}), testing::HasSubstr("expected 2"));
   EXPECT_THAT(refused({slalom()[0], slalom()[0]}, {}), testing::HasSubstr("waypoint 2"));
+  EXPECT_THAT(refused({{{0, 0, 0}, 0, {}}, {{1, 0, 0}, 0, 1e300}}, {}),
+              testing::HasSubstr("at most 21600 s"));
+  EXPECT_THAT(refused({{{0, 0, 0}, 0, {}}, {{1e300, 0, 0}, 0, {}}}, {}),
+              testing::HasSubstr("at most 21600 s"));
   EXPECT_THAT(refused({{{0, 0, 0}, 0, {}}, {{1, 0, std::nan("")}, 0, {}}}, {}),
               testing::HasSubstr("not finite"));
   EXPECT_THAT(refused({{{0, 0, 0}, 0, {}}, {{1, 0, 0}, 0, -1}}, {}),
