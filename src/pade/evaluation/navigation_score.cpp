@@ -1,0 +1,95 @@
+#include "pade/evaluation/navigation_score.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace pade::evaluation {
+
+std::optional<TrueState> truth_at(const std::vector<TrueState>& truth, Time time) {
+  constexpr double kLongest = 0.1;
+  const auto after = std::lower_bound(truth.begin(), truth.end(), time,
+                                      [](const TrueState& state, Time t) { return state.time < t; });
+  if (after == truth.end()) return std::nullopt;
+  if (after->time == time) return *after;
+  if (after == truth.begin()) return std::nullopt;
+  const TrueState& a = *(after - 1);
+  const double interval = seconds_between(a.time, after->time);
+  if (interval > kLongest) return std::nullopt;
+  const double s = seconds_between(a.time, time) / interval;
+  TrueState state;
+  state.time = time;
+  state.T_world_body.translation = (1 - s) * a.T_world_body.translation + s * after->T_world_body.translation;
+  state.T_world_body.rotation = a.T_world_body.rotation.slerp(s, after->T_world_body.rotation);
+  state.velocity = (1 - s) * a.velocity + s * after->velocity;
+  return state;
+}
+
+std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vector<TrueState>& truth) {
+  const auto first = truth_at(truth, estimate.t1);
+  const auto second = truth_at(truth, estimate.t2);
+  if (!first || !second) return std::nullopt;
+  const Pose T = first->T_world_body.inverse() * second->T_world_body;
+  MotionError error;
+  error.t2 = estimate.t2;
+  const Eigen::Vector3d difference = estimate.motion.t_reference_other - T.translation;
+  error.translation = difference.norm();
+  error.rotation =
+      rotation_log(Eigen::Matrix3d(estimate.motion.R_reference_other.transpose() * T.matrix3())).norm();
+  error.baseline = T.translation.norm();
+  error.estimated_baseline = estimate.motion.t_reference_other.norm();
+  error.sigma = std::sqrt(estimate.motion.covariance.topLeftCorner<3, 3>().trace());
+  error.nees = difference.dot(estimate.motion.covariance.topLeftCorner<3, 3>().ldlt().solve(difference));
+  error.scale_valid = estimate.scale_valid;
+  return error;
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const double rank = share * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(rank);
+  std::sort(values.begin(), values.end());
+  const double above = low + 1 < values.size() ? values[low + 1] : values[low];
+  return values[low] + (rank - static_cast<double>(low)) * (above - values[low]);
+}
+
+MotionSummary summarise(const std::vector<MotionError>& errors) {
+  std::vector<double> translation;
+  std::vector<double> relative;
+  std::vector<double> rotation;
+  double nees = 0;
+  std::size_t good = 0;
+  std::size_t good_valid = 0;
+  std::size_t bad = 0;
+  std::size_t bad_invalid = 0;
+  for (const MotionError& error : errors) {
+    translation.push_back(error.translation);
+    rotation.push_back(error.rotation);
+    if (error.baseline > 0) relative.push_back(error.translation / error.baseline);
+    nees += error.nees;
+    if (error.translation < 0.1 * error.baseline) {
+      ++good;
+      good_valid += error.scale_valid ? 1 : 0;
+    } else if (error.translation > 0.2 * error.baseline) {
+      ++bad;
+      bad_invalid += error.scale_valid ? 0 : 1;
+    }
+  }
+  const auto share = [](std::size_t part, std::size_t whole) {
+    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole)
+                     : std::numeric_limits<double>::quiet_NaN();
+  };
+  MotionSummary summary;
+  summary.pairs = errors.size();
+  summary.translation_median = quantile(translation, 0.5);
+  summary.translation_95 = quantile(translation, 0.95);
+  summary.relative_median = quantile(relative, 0.5);
+  summary.rotation_95 = quantile(rotation, 0.95);
+  summary.nees_mean =
+      errors.empty() ? std::numeric_limits<double>::quiet_NaN() : nees / static_cast<double>(errors.size());
+  summary.valid_where_good = share(good_valid, good);
+  summary.invalid_where_bad = share(bad_invalid, bad);
+  return summary;
+}
+
+}  // namespace pade::evaluation

@@ -1,0 +1,56 @@
+// How good a navigation solution is for depth: errors of the relative motion, their consistency with the
+// filter's own covariance, and the honesty of `scale_valid`.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "pade/core/navigation_log.hpp"
+#include "pade/core/pose.hpp"
+#include "pade/core/time.hpp"
+
+namespace pade::evaluation {
+
+/// The truth at a time: linear interpolation between two states at most 0.1 s apart, nothing outside.
+std::optional<TrueState> truth_at(const std::vector<TrueState>& truth, Time time);
+
+/// An estimated motion of the body between two times.
+struct EstimatedMotion {
+  Time t1;
+  Time t2;
+  RelativeMotion motion;  ///< reference: t1
+  bool scale_valid = false;
+};
+
+/// One pair scored against the truth.
+struct MotionError {
+  Time t2;
+  double translation = 0;         ///< norm of the error in the frame at t1, m
+  double rotation = 0;            ///< angle, rad
+  double baseline = 0;            ///< true distance, m
+  double estimated_baseline = 0;  ///< m
+  double sigma = 0;               ///< predicted: root of the trace of the translation's covariance, m
+  double nees = 0;                ///< normalised error squared of the translation, 3 degrees of freedom
+  bool scale_valid = false;
+};
+
+std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vector<TrueState>& truth);
+
+/// The value below which a share of the values lies (0.95: the 95 % figure); NaN where there are none.
+double quantile(std::vector<double> values, double share);
+
+struct MotionSummary {
+  std::size_t pairs = 0;
+  double translation_median = 0;  ///< m
+  double translation_95 = 0;      ///< m
+  double relative_median = 0;     ///< error over true baseline
+  double rotation_95 = 0;         ///< rad
+  double nees_mean = 0;
+  double valid_where_good =
+      0;  ///< share of the pairs with an error under 10 % of the baseline that are scale_valid
+  double invalid_where_bad = 0;  ///< share of the pairs with an error over 20 % that are not
+};
+
+MotionSummary summarise(const std::vector<MotionError>& errors);
+
+}  // namespace pade::evaluation

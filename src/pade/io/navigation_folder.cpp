@@ -1,0 +1,137 @@
+// Log folders, and our own layout as text.
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "pade/io/navigation_log.hpp"
+#include "pade/io/text.hpp"
+
+namespace pade::io {
+namespace {
+
+/// The file in `folder` whose name ends with `ending`; empty where there is none.
+std::filesystem::path file_ending_with(const std::filesystem::path& folder, std::string_view ending) {
+  std::vector<std::filesystem::path> found;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (it->path().filename().string().ends_with(ending)) found.push_back(it->path());
+  }
+  std::sort(found.begin(), found.end());
+  return found.empty() ? std::filesystem::path() : found.front();
+}
+
+Result<std::filesystem::path> gnss_file(const std::filesystem::path& folder, const std::string& chosen) {
+  namespace fs = std::filesystem;
+  if (!chosen.empty()) return folder / chosen;
+  if (fs::exists(folder / "gnss.csv")) return folder / "gnss.csv";
+  std::vector<std::string> candidates;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string file = it->path().filename().string();
+    if (file.ends_with(".csv") && (file.starts_with("gnss") || file.ends_with("-gnss.csv")))
+      candidates.push_back(file);
+  }
+  std::sort(candidates.begin(), candidates.end());
+  if (candidates.empty()) return fs::path();
+  if (candidates.size() == 1) return folder / candidates.front();
+  return Error{fmt::format("{}: {} GNSS files, choose one: {}", folder.string(), candidates.size(),
+                           fmt::join(candidates, ", "))};
+}
+
+template <class Parse>
+auto read_optional(const std::filesystem::path& path, Parse parse, std::vector<std::string>& remarks)
+    -> decltype(parse(std::string_view(), std::string_view(), remarks)) {
+  if (path.empty() || !std::filesystem::exists(path)) {
+    return typename std::remove_cvref_t<decltype(*parse(std::string_view(), std::string_view(), remarks))>{};
+  }
+  const auto text = read_text(path);
+  if (!text) return text.error();
+  return parse(*text, path.string(), remarks);
+}
+
+}  // namespace
+
+Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
+                                          const NavigationLogOptions& options) {
+  namespace fs = std::filesystem;
+  NavigationLog log;
+  fs::path imu = folder / "imu.csv";
+  fs::path truth = folder / "truth.csv";
+  for (const fs::path& euroc : {folder / "mav0", folder}) {
+    if (!fs::exists(imu) && fs::exists(euroc / "imu0" / "data.csv")) {
+      imu = euroc / "imu0" / "data.csv";
+      truth = euroc / "state_groundtruth_estimate0" / "data.csv";
+    }
+  }
+  if (!fs::exists(imu)) imu = file_ending_with(folder, "-imu.csv");
+  if (imu.empty())
+    return Error{
+        fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv", folder.string())};
+  const auto imu_text = read_text(imu);
+  if (!imu_text) return imu_text.error();
+  auto samples = parse_imu(*imu_text, imu.string(), log.remarks);
+  if (!samples) return samples.error();
+  log.imu = std::move(*samples);
+
+  const auto gnss_path = gnss_file(folder, options.gnss);
+  if (!gnss_path) return gnss_path.error();
+  if (!gnss_path->empty()) {
+    const auto text = read_text(*gnss_path);
+    if (!text) return text.error();
+    auto gnss = parse_gnss(*text, gnss_path->string(), options.gnss_defaults, log.remarks);
+    if (!gnss) return gnss.error();
+    log.gnss = std::move(*gnss);
+  }
+  auto barometer = read_optional(folder / "baro.csv", parse_barometer, log.remarks);
+  if (!barometer) return barometer.error();
+  log.barometer = std::move(*barometer);
+  auto magnetometer = read_optional(folder / "mag.csv", parse_magnetometer, log.remarks);
+  if (!magnetometer) return magnetometer.error();
+  log.magnetometer = std::move(*magnetometer);
+  auto states = read_optional(truth, parse_truth, log.remarks);
+  if (!states) return states.error();
+  log.truth = std::move(*states);
+  return log;
+}
+
+std::string format_imu(const std::vector<ImuSample>& samples) {
+  std::string text = "# frame=FLU\nt_s,gx,gy,gz,ax,ay,az\n";
+  for (const ImuSample& s : samples) {
+    fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{}\n", to_string(s.time), s.angular_rate.x(),
+                   s.angular_rate.y(), s.angular_rate.z(), s.specific_force.x(), s.specific_force.y(),
+                   s.specific_force.z());
+  }
+  return text;
+}
+
+std::string format_gnss(const GnssLog& log) {
+  std::string text = "# frame=ENU";
+  const GeodeticOrigin origin = log.origin.value_or(GeodeticOrigin{});
+  fmt::format_to(std::back_inserter(text), " origin={},{},{}", origin.latitude, origin.longitude,
+                 origin.height);
+  if (log.lever_arm) {
+    fmt::format_to(std::back_inserter(text), " lever_arm={},{},{}", log.lever_arm->x(), log.lever_arm->y(),
+                   log.lever_arm->z());
+  }
+  text += "\nt_s,pE,pN,pU,vE,vN,vU,sE,sN,sU,svE,svN,svU\n";
+  std::size_t next = 0;
+  for (const GnssFix& fix : log.fixes) {
+    while (next < log.velocities.size() && log.velocities[next].time < fix.time) ++next;
+    const bool paired = next < log.velocities.size() && log.velocities[next].time == fix.time;
+    const Eigen::Vector3d none = Eigen::Vector3d::Constant(std::nan(""));
+    const Eigen::Vector3d v = paired ? log.velocities[next].velocity : none;
+    const Eigen::Vector3d s = fix.covariance.diagonal().cwiseSqrt();
+    const Eigen::Vector3d sv =
+        paired ? Eigen::Vector3d(log.velocities[next].covariance.diagonal().cwiseSqrt()) : none;
+    fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", to_string(fix.time),
+                   fix.position.x(), fix.position.y(), fix.position.z(), v.x(), v.y(), v.z(), s.x(), s.y(),
+                   s.z(), sv.x(), sv.y(), sv.z());
+  }
+  return text;
+}
+
+}  // namespace pade::io

@@ -1,0 +1,264 @@
+#include "pade/navigation/alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace pade::navigation {
+namespace {
+
+constexpr double kLookInterval = 0.1;      // s
+constexpr double kHopeless = 15;           // log-likelihood behind the best at which a hypothesis is dropped
+constexpr double kUnknownPosition = 1e4;   // m
+constexpr double kMotionTiltSigma = 0.08;  // of the first level in motion, rad
+constexpr double kMotionForceDoubt = 0.3;  // m/s²
+
+Vector3d yaw_axis(const Quaterniond& R) {
+  const bool upright = std::abs((R * Vector3d::UnitX()).z()) < 0.94;
+  return upright ? Vector3d::UnitX() : Vector3d::UnitY();
+}
+
+double azimuth(const Vector3d& w) { return std::atan2(w.y(), w.x()); }
+
+/// The rotation by which the measured up direction of the body becomes `up` of the world, at the given yaw.
+Quaterniond attitude(const Vector3d& measured, const Vector3d& up, double yaw) {
+  const Quaterniond level = Quaterniond::FromTwoVectors(measured, Vector3d::UnitZ());
+  const double turn = yaw - azimuth(level * yaw_axis(level));
+  const Quaterniond turned = rotation_exp({0, 0, turn}) * level;
+  return (Quaterniond::FromTwoVectors(turned * measured, up) * turned).normalized();
+}
+
+/// Covariance of φ for independent errors about the world's axes.
+Matrix3d attitude_covariance(const Quaterniond& R, double tilt_sigma, double yaw_sigma) {
+  const Matrix3d rotation = R.toRotationMatrix();
+  const Vector3d variance(tilt_sigma * tilt_sigma, tilt_sigma * tilt_sigma, yaw_sigma * yaw_sigma);
+  return rotation.transpose() * variance.asDiagonal() * rotation;
+}
+
+/// The last measurement of a kind in [from, to].
+const Measurement* last_of(const Timeline& timeline, SensorKind kind, Time from, Time to) {
+  for (std::size_t i = timeline.measurements.count_until(to);
+       i-- > 0 && timeline.measurements[i].time >= from;) {
+    if (timeline.measurements[i].kind == kind) return &timeline.measurements[i];
+  }
+  return nullptr;
+}
+
+BaseMatrix prior(const FilterOptions& options, const Quaterniond& R, double tilt_sigma, double yaw_sigma,
+                 double velocity_sigma) {
+  BaseMatrix P = BaseMatrix::Zero();
+  const auto set = [&](int first, double sigma) {
+    P.diagonal().segment<3>(first).setConstant(sigma * sigma);
+  };
+  P.block<3, 3>(kPhi, kPhi) = attitude_covariance(R, tilt_sigma, yaw_sigma);
+  set(kNu, velocity_sigma);
+  set(kRho, kUnknownPosition);
+  set(kGyroscopeBias, options.gyroscope_bias_sigma);
+  set(kAccelerometerBias, options.accelerometer_bias_sigma);
+  return P;
+}
+
+Time earlier(Time time, double seconds) {
+  return Time{time.nanoseconds - Time::from_seconds(seconds).nanoseconds};
+}
+
+}  // namespace
+
+std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const AlignmentOptions& options) {
+  const Time from = earlier(now, options.level_time);
+  const std::size_t begin = timeline.imu.count_until(from);
+  const std::size_t end = timeline.imu.count_until(now);
+  if (begin == 0 || end < begin + 20) return std::nullopt;  // the window must be covered
+  Vector3d rate = Vector3d::Zero();
+  Vector3d force = Vector3d::Zero();
+  for (std::size_t i = begin; i < end; ++i) {
+    rate += timeline.imu[i].angular_rate;
+    force += timeline.imu[i].specific_force;
+  }
+  const auto count = static_cast<double>(end - begin);
+  rate /= count;
+  force /= count;
+  Vector3d rate_square = Vector3d::Zero();
+  Vector3d force_square = Vector3d::Zero();
+  for (std::size_t i = begin; i < end; ++i) {
+    rate_square += (timeline.imu[i].angular_rate - rate).cwiseAbs2();
+    force_square += (timeline.imu[i].specific_force - force).cwiseAbs2();
+  }
+  const auto limit = [&](double sigma) { return sigma * sigma * count; };
+  if (rate_square.maxCoeff() > limit(options.rest_rate_sigma)) return std::nullopt;
+  if (force_square.maxCoeff() > limit(options.rest_force_sigma)) return std::nullopt;
+  for (std::size_t i = timeline.measurements.count_until(now);
+       i-- > 0 && timeline.measurements[i].time > from;) {
+    const Measurement& m = timeline.measurements[i];
+    if (m.kind != SensorKind::gnss_velocity) continue;
+    if (m.value.norm() > options.rest_speed + 3 * std::sqrt(m.covariance.trace())) return std::nullopt;
+  }
+  return RestMeans{now, rate, force, options.level_time};
+}
+
+void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw_sigma) {
+  NavigationState state;
+  state.time = rest.time;
+  state.X.R = attitude(rest.specific_force, Vector3d::UnitZ(), yaw);
+  state.gyroscope_bias = rest.angular_rate;
+  constexpr double kAnyTilt = 0.5;
+  BaseMatrix P = prior(filter.options(), state.X.R, kAnyTilt, yaw_sigma, 0.05);
+  const double rate_sigma = 3 * filter.options().gyroscope_noise / std::sqrt(rest.duration) + 1e-3;
+  P.diagonal().segment<3>(kGyroscopeBias).setConstant(rate_sigma * rate_sigma);
+  filter.start(state, P);
+  // The update ties tilt to accelerometer bias as they are tied in truth: only their sum was seen.
+  filter.update_static_force(rest.specific_force,
+                             3 * filter.options().accelerometer_noise / std::sqrt(rest.duration));
+}
+
+Yaw yaw_of(Filter& filter) {
+  const BaseMatrix P = filter.covariance();
+  const Quaterniond R = filter.state().X.R;
+  const Eigen::RowVector3d up = R.toRotationMatrix().row(2);
+  return {azimuth(R * yaw_axis(R)),
+          std::sqrt(std::max(0.0, (up * P.block<3, 3>(kPhi, kPhi) * up.transpose()).value()))};
+}
+
+Alignment::Alignment(const FilterOptions& filter, const Vector3d& lever_arm, const AlignmentOptions& options)
+    : options_(options), bank_(static_cast<std::size_t>(std::max(1, options.hypotheses))) {
+  for (Hypothesis& hypothesis : bank_) hypothesis.filter = Filter(filter, lever_arm);
+}
+
+void Alignment::reset() {
+  running_ = started_clock_ = yaw_measured_ = false;
+  best_ = 0;
+}
+
+bool Alignment::start_from_rest(Timeline& timeline, Time now) {
+  const auto rest = detect_rest(timeline, now, options_);
+  if (!rest) return false;
+  const Time from = earlier(now, options_.level_time);
+  std::optional<Yaw> yaw;
+  if (const Measurement* heading = last_of(timeline, SensorKind::heading, from, now)) {
+    yaw = Yaw{heading->value.x(), heading->sigma};
+  } else if (const Measurement* field = last_of(timeline, SensorKind::magnetometer, from, now)) {
+    const Quaterniond level = attitude(rest->specific_force, Vector3d::UnitZ(), 0);
+    const double north = 0.5 * std::numbers::pi - timeline.declination;
+    yaw = Yaw{north - azimuth(level * field->value), options_.heading_sigma_magnetic};
+  }
+  const double spacing = 2 * std::numbers::pi / static_cast<double>(bank_.size());
+  for (std::size_t i = 0; i < bank_.size(); ++i) {
+    bank_[i].alive = !yaw || i == 0;
+    if (!bank_[i].alive) continue;
+    start_at_rest(bank_[i].filter, *rest, yaw ? yaw->angle : static_cast<double>(i) * spacing,
+                  yaw ? yaw->sigma : 0.6 * spacing);
+  }
+  yaw_measured_ = yaw.has_value();
+  return true;
+}
+
+bool Alignment::is_moving(const Timeline& timeline, Time now) const {
+  const Measurement* last = last_of(timeline, SensorKind::gnss_velocity, earlier(now, 0.5), now);
+  return last != nullptr &&
+         last->value.norm() > options_.rest_speed + 3 * std::sqrt(last->covariance.trace());
+}
+
+bool Alignment::start_in_motion(Timeline& timeline, Time now) {
+  // Two velocities a window apart: R_0 Δv = v_1 - v_0 - g T gives the direction of "up" as the body felt it.
+  const Measurement* last = last_of(timeline, SensorKind::gnss_velocity, earlier(now, 0.5), now);
+  if (last == nullptr) return false;
+  const Time from = earlier(last->time, options_.motion_window);
+  const Measurement* first = last_of(timeline, SensorKind::gnss_velocity, earlier(from, 0.5), from);
+  if (first == nullptr) return false;
+  const std::size_t begin = timeline.imu.count_until(first->time);
+  const std::size_t end = timeline.imu.count_until(last->time);
+  if (begin == 0 || end < begin + 5) return false;
+  ImuIncrement increment;
+  Time time = first->time;
+  for (std::size_t i = begin; i < end; ++i) {
+    const double dt = seconds_between(time, timeline.imu[i].time);
+    if (dt > 0)
+      accumulate(increment, imu_step(timeline.imu[i].angular_rate, timeline.imu[i].specific_force, dt), dt, 0,
+                 0);
+    time = timeline.imu[i].time;
+  }
+  const FilterOptions& filter_options = bank_.front().filter.options();
+  const Vector3d up =
+      last->value - first->value + Vector3d(0, 0, filter_options.gravity * increment.duration);
+  const double spacing = 2 * std::numbers::pi / static_cast<double>(bank_.size());
+  for (std::size_t i = 0; i < bank_.size(); ++i) {
+    NavigationState state;
+    state.time = time;
+    const Quaterniond R0 = attitude(increment.v, up, static_cast<double>(i) * spacing);
+    state.X.R = (R0 * Quaterniond(increment.R)).normalized();
+    state.X.v = last->value;
+    const double tilt = std::hypot(kMotionTiltSigma, kMotionForceDoubt / filter_options.gravity);
+    const double velocity_sigma = std::sqrt(last->covariance.trace());
+    bank_[i].filter.start(state, prior(filter_options, state.X.R, tilt, 0.6 * spacing, velocity_sigma));
+    bank_[i].alive = true;
+  }
+  yaw_measured_ = false;
+  return true;
+}
+
+AlignmentPhase Alignment::update(Timeline& timeline, Time now) {
+  // Everything looks at a moment in the past by which late data has come: the start does not depend on
+  // delays.
+  const Time until = earlier(now, options_.lag);
+  if (!started_clock_) {
+    started_clock_ = true;
+    first_ = last_look_ = now;
+  }
+  if (seconds_between(last_look_, now) < kLookInterval)
+    return running_ ? AlignmentPhase::levelled : AlignmentPhase::waiting;
+  last_look_ = now;
+  if (!running_) {
+    const bool rested = start_from_rest(timeline, until);
+    // A vehicle that may yet come to rest, or be found at rest, is given the time to show it.
+    const bool waited = seconds_between(first_, until) > options_.level_time + 2 * kLookInterval;
+    running_ = rested || ((waited || is_moving(timeline, until)) && start_in_motion(timeline, until));
+    if (!running_) return AlignmentPhase::waiting;
+    begin_at_first_fix(timeline, until);
+    if (yaw_measured_) return AlignmentPhase::aligned;
+  }
+  for (Hypothesis& hypothesis : bank_) {
+    if (hypothesis.alive && hypothesis.filter.state().time < until)
+      timeline.advance(hypothesis.filter, until);
+  }
+  return weigh();
+}
+
+void Alignment::begin_at_first_fix(const Timeline& timeline, Time until) {
+  // Far from the origin the gate of the first fix would close.
+  const Measurement* fix = last_of(timeline, SensorKind::gnss_position, Time{INT64_MIN}, until);
+  if (fix == nullptr) return;
+  for (Hypothesis& hypothesis : bank_) {
+    if (!hypothesis.alive) continue;
+    FilterSnapshot snapshot = hypothesis.filter.snapshot();
+    snapshot.state.X.p = fix->value;
+    hypothesis.filter.restore(snapshot);
+  }
+}
+
+AlignmentPhase Alignment::weigh() {
+  double best = -1e300;
+  for (std::size_t i = 0; i < bank_.size(); ++i) {
+    if (bank_[i].alive && bank_[i].filter.core().log_likelihood > best) {
+      best = bank_[i].filter.core().log_likelihood;
+      best_ = i;
+    }
+  }
+  const double centre = yaw_of(bank_[best_].filter).angle;
+  double total = 0;
+  double spread = 0;
+  for (Hypothesis& hypothesis : bank_) {
+    if (!hypothesis.alive) continue;
+    const double behind = best - hypothesis.filter.core().log_likelihood;
+    if (behind > kHopeless) {
+      hypothesis.alive = false;
+      continue;
+    }
+    const Yaw yaw = yaw_of(hypothesis.filter);
+    const double difference = std::remainder(yaw.angle - centre, 2 * std::numbers::pi);
+    total += std::exp(-behind);
+    spread += std::exp(-behind) * (difference * difference + yaw.sigma * yaw.sigma);
+  }
+  return std::sqrt(spread / total) < options_.yaw_known ? AlignmentPhase::aligned : AlignmentPhase::levelled;
+}
+
+}  // namespace pade::navigation

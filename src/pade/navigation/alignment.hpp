@@ -1,0 +1,97 @@
+// Finding the first attitude: static levelling with gyroscope bias, or a start in motion, and yaw from a
+// heading, a magnetometer, or a bank of filters that start at yaws all round the compass and are weighed by
+// how well they predict the GNSS (docs/navigation.md, section 5).
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "pade/navigation/timeline.hpp"
+
+namespace pade::navigation {
+
+struct AlignmentOptions {
+  double level_time = 2.0;               ///< seconds of rest for levelling
+  double rest_rate_sigma = 0.02;         ///< spread of the angular rate that counts as rest, rad/s
+  double rest_force_sigma = 0.7;         ///< spread of the specific force that counts as rest, m/s²
+  double rest_speed = 0.3;               ///< GNSS speed that does not contradict rest, m/s
+  double motion_window = 1.0;            ///< baseline of the first GNSS velocities of a start in motion, s
+  double heading_sigma_magnetic = 0.15;  ///< of a yaw from a single uncalibrated magnetometer, rad
+  int hypotheses = 12;                   ///< yaws of the bank
+  double yaw_known = 0.125;              ///< spread of the bank's yaw at which the best filter is taken, rad
+  double lag = 0.4;                      ///< the bank waits this long for late data, s
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("level_time", self.level_time, "seconds of rest for levelling");
+    field("rest_rate_sigma", self.rest_rate_sigma, "spread of the angular rate that counts as rest, rad/s");
+    field("rest_force_sigma", self.rest_force_sigma,
+          "spread of the specific force that counts as rest, m/s²");
+    field("rest_speed", self.rest_speed, "GNSS speed that does not contradict rest, m/s");
+    field("motion_window", self.motion_window,
+          "baseline of the first GNSS velocities of a start in motion, s");
+    field("heading_sigma_magnetic", self.heading_sigma_magnetic, "of a magnetometer's first yaw, rad");
+    field("hypotheses", self.hypotheses, "yaws of the bank");
+    field("yaw_known", self.yaw_known, "spread of the bank's yaw that is good enough, rad");
+    field("lag", self.lag, "the start waits this long for late data, s");
+  }
+};
+
+/// Specific force and angular rate of a body at rest.
+struct RestMeans {
+  Time time;  ///< end of the window
+  Vector3d angular_rate;
+  Vector3d specific_force;
+  double duration = 0;
+};
+
+/// Means over the last `level_time` seconds if the body was at rest all the time.
+std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const AlignmentOptions& options);
+
+/// Puts a filter at rest: level from the specific force, gyroscope bias from the rate, at a yaw (azimuth of
+/// the body's x axis, or of its y axis where x is near vertical) with its uncertainty.
+void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw_sigma);
+
+/// Azimuth of the body's x axis (y where x is within 20° of the vertical), and its standard deviation.
+struct Yaw {
+  double angle = 0;
+  double sigma = 0;
+};
+Yaw yaw_of(Filter& filter);
+
+/// What alignment is at.
+enum class AlignmentPhase { waiting, levelled, aligned };
+
+class Alignment {
+ public:
+  Alignment(const FilterOptions& filter, const Vector3d& lever_arm, const AlignmentOptions& options);
+  void reset();
+
+  /// Looks at the data up to `now`. When `aligned`, `result()` holds the filter, at a time at or before
+  /// `now`.
+  AlignmentPhase update(Timeline& timeline, Time now);
+  [[nodiscard]] const Filter& result() const { return bank_[best_].filter; }
+
+ private:
+  struct Hypothesis {
+    Filter filter;
+    bool alive = false;
+  };
+
+  bool start_from_rest(Timeline& timeline, Time now);
+  [[nodiscard]] bool is_moving(const Timeline& timeline, Time now) const;
+  bool start_in_motion(Timeline& timeline, Time now);
+  void begin_at_first_fix(const Timeline& timeline, Time until);
+  AlignmentPhase weigh();
+
+  AlignmentOptions options_;
+  std::vector<Hypothesis> bank_;
+  std::size_t best_ = 0;
+  bool running_ = false;
+  bool started_clock_ = false;
+  bool yaw_measured_ = false;
+  Time first_;
+  Time last_look_;
+};
+
+}  // namespace pade::navigation

@@ -1,0 +1,382 @@
+#include "pade/navigation/filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace pade::navigation {
+namespace {
+
+constexpr double kSmoothTime = 2.0;  // s
+constexpr int kLeastRejections = 3;  // in a row, before a sensor is believed against the filter
+
+double wrap_angle(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
+
+/// A covariance with each axis at or above the floor; nothing if it is not a covariance.
+Matrix3d floored(const Matrix3d& covariance, double floor) {
+  Matrix3d result = 0.5 * (covariance + covariance.transpose());
+  for (int i = 0; i < 3; ++i) result(i, i) = std::max(result(i, i), floor * floor);
+  return result;
+}
+
+}  // namespace
+
+FilterOptions FilterOptions::of(ImuClass imu) {
+  FilterOptions options;
+  if (imu == ImuClass::consumer) {
+    options.gyroscope_noise = 6e-4;
+    options.gyroscope_bias_walk = 3e-5;
+    options.accelerometer_bias_sigma = 0.3;
+  }
+  return options;
+}
+
+void Filter::start(const NavigationState& state, const BaseMatrix& covariance) {
+  core_ = {};
+  core_.state = state;
+  core_.position_accepted = core_.velocity_accepted = state.time;
+  clones_ = 0;
+  P_ = covariance;
+}
+
+FilterSnapshot Filter::snapshot() const {
+  FilterSnapshot snapshot;
+  static_cast<FilterCore&>(snapshot) = core_;
+  snapshot.P = P_.topLeftCorner<kBase, kBase>();
+  return snapshot;
+}
+
+void Filter::restore(const FilterSnapshot& snapshot) {
+  core_ = snapshot;
+  clones_ = 0;
+  P_ = snapshot.P;
+}
+
+void Filter::drop_clones() {
+  clones_ = 0;
+  P_.conservativeResize(kBase, kBase);
+}
+
+BaseMatrix Filter::covariance() {
+  flush();
+  return P_.topLeftCorner<kBase, kBase>();
+}
+
+void Filter::propagate(Time to, const Vector3d& rate_mean, const Vector3d& force_mean,
+                       const Vector3d& rate_end) {
+  NavigationState& state = core_.state;
+  const double dt = seconds_between(state.time, to);
+  if (dt <= 0) return;
+  const ImuStep step = imu_step(rate_mean - state.gyroscope_bias, force_mean - state.accelerometer_bias, dt);
+  // A saturated sensor has seen less than there was.
+  const bool rate_saturated = rate_mean.cwiseAbs().maxCoeff() > options_.gyroscope_range;
+  const bool force_saturated = force_mean.cwiseAbs().maxCoeff() > options_.accelerometer_range;
+  accumulate(core_.pending, step, dt, options_.gyroscope_noise * (rate_saturated ? 300 : 1),
+             options_.accelerometer_noise * (force_saturated ? 300 : 1));
+
+  const Vector3d gravity(0, 0, -options_.gravity);
+  const Matrix3d R = state.X.R.toRotationMatrix();
+  state.X.p += dt * state.X.v + 0.5 * dt * dt * gravity + R * step.p;
+  state.X.v += dt * gravity + R * step.v;
+  state.X.R = (state.X.R * Quaterniond(step.R)).normalized();
+  state.angular_rate = rate_end - state.gyroscope_bias;
+  state.time = to;
+  const double decay = std::exp(-dt / kSmoothTime);
+  core_.smooth_position *= decay;
+  core_.smooth_rotation *= decay;
+}
+
+void Filter::add_gap_noise(double duration) {
+  const double angle = options_.gap_rate * duration;
+  const double speed = options_.gap_acceleration * duration;
+  core_.pending.noise.diagonal().head<3>().array() += angle * angle;
+  core_.pending.noise.diagonal().segment<3>(3).array() += speed * speed;
+  core_.pending.noise.diagonal().tail<3>().array() += 0.25 * speed * speed * duration * duration;
+}
+
+void Filter::flush() {
+  const ImuIncrement& pending = core_.pending;
+  const double T = pending.duration;
+  if (T <= 0 && pending.noise.isZero(0)) return;
+  Eigen::Matrix<double, kCore, kCore> Phi = Eigen::Matrix<double, kCore, kCore>::Identity();
+  Phi.topLeftCorner<9, 9>() = pending.transition();
+  Phi.topRightCorner<9, 6>() = pending.bias_jacobian;
+
+  // Core, then cross terms with everything else, in the order that needs no copy.
+  const Eigen::Matrix<double, kCore, kCore> core = Phi * P_.topLeftCorner<kCore, kCore>() * Phi.transpose();
+  P_.topLeftCorner<kCore, kCore>() = 0.5 * (core + core.transpose());
+  P_.topLeftCorner<9, 9>() += 0.5 * (pending.noise + pending.noise.transpose());
+  const int rest = size() - kCore;
+  const Eigen::Matrix<double, kCore, Eigen::Dynamic, 0, kCore, kMaxState - kCore> cross =
+      Phi * P_.topRightCorner(kCore, rest);
+  P_.topRightCorner(kCore, rest) = cross;
+
+  const auto walk = [&](int first, double density) {
+    P_.diagonal().segment<3>(first).array() += density * density * T;
+  };
+  walk(kGyroscopeBias, options_.gyroscope_bias_walk);
+  walk(kAccelerometerBias, options_.accelerometer_bias_walk);
+
+  const double tau = core_.gnss_class.correlation_time;
+  const double position_decay = tau > 0 ? std::exp(-T / tau) : 1;
+  const double height_decay = std::exp(-T / options_.barometer_correlation_time);
+  P_.middleCols<3>(kPositionBias) *= position_decay;
+  P_.middleRows<3>(kPositionBias) *= position_decay;
+  P_.col(kHeightBias) *= height_decay;
+  P_.row(kHeightBias) *= height_decay;
+  P_.diagonal().segment<3>(kPositionBias) +=
+      (1 - position_decay * position_decay) * core_.gnss_class.bias_sigma.cwiseAbs2();
+  P_(kHeightBias, kHeightBias) +=
+      (1 - height_decay * height_decay) * options_.barometer_bias_sigma * options_.barometer_bias_sigma;
+  core_.state.position_bias *= position_decay;
+  core_.state.height_bias *= height_decay;
+
+  P_.bottomLeftCorner(rest, kCore) = P_.topRightCorner(kCore, rest).transpose();
+  core_.pending = {};
+}
+
+template <int M>
+Innovation Filter::correct(const Prediction<M>& prediction, const Eigen::Matrix<double, M, 1>& residual,
+                           Eigen::Matrix<double, M, M> noise, double gate, bool force) {
+  using Tall = Eigen::Matrix<double, Eigen::Dynamic, M, 0, kMaxState, M>;
+  using Square = Eigen::Matrix<double, M, M>;
+  const Tall PHt = P_.leftCols<kBase>() * prediction.H.transpose();
+  Square S = prediction.H * PHt.template topRows<kBase>() + noise;
+  Innovation innovation;
+  innovation.size = M;
+  innovation.residual.template head<M>() = residual;
+  innovation.sigma.template head<M>() = S.diagonal().cwiseSqrt();
+  Eigen::LLT<Square> factor(S);
+  if (factor.info() != Eigen::Success || !residual.allFinite()) return innovation;
+  innovation.chi_square = residual.dot(factor.solve(residual));
+  if (!std::isfinite(innovation.chi_square)) return innovation;
+  innovation.log_likelihood =
+      -0.5 * innovation.chi_square - factor.matrixLLT().diagonal().array().log().sum();
+  // An outlier tells little about which hypothesis is right: its share is bounded.
+  core_.log_likelihood += innovation.log_likelihood + 0.5 * std::max(0.0, innovation.chi_square - 2 * gate);
+  innovation.verdict = Verdict::accepted;
+  if (innovation.chi_square > gate) {
+    const double excess = innovation.chi_square / gate;
+    innovation.verdict = excess > options_.soft_gate && !force ? Verdict::rejected : Verdict::inflated;
+    if (innovation.verdict == Verdict::rejected) return innovation;
+    S *= excess;  // noise + (excess - 1) S: the residual lies on the gate
+    factor.compute(S);
+  }
+  const Tall K = factor.solve(PHt.transpose()).transpose();
+  // Joseph form multiplied out, (I - KH) P (I - KH)^T + K N K^T = P - K W^T - W K^T with W = P H^T - K S / 2.
+  const Tall W = PHt - 0.5 * (K * S);
+  P_.noalias() -= K * W.transpose();
+  P_.noalias() -= W * K.transpose();
+  apply(K * residual);
+  return innovation;
+}
+
+void Filter::apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1>& error) {
+  const ExtendedPose before = core_.state.X;
+  core_.state.retract(error.head<kBase>());
+  for (int i = 0; i < clones_; ++i) {
+    const auto xi = error.segment<6>(kBase + 6 * i);
+    Pose& pose = clone_poses_[static_cast<std::size_t>(i)];
+    const Vector3d phi = xi.head<3>();
+    pose = pose * Pose{rotation_exp(phi), left_jacobian(phi) * xi.tail<3>()};
+  }
+  // The smooth pose stays where it was.
+  core_.smooth_position += before.p - core_.state.X.p;
+  core_.smooth_rotation =
+      rotation_log(Quaterniond(rotation_exp(core_.smooth_rotation) * before.R * core_.state.X.R.conjugate()));
+}
+
+Matrix3d Filter::split_position_noise(const GnssFix& fix) {
+  const Matrix3d total = floored(fix.covariance, options_.position_sigma_floor);
+  const double horizontal = std::sqrt(0.5 * (total(0, 0) + total(1, 1)));
+  const bool carrier = horizontal < options_.carrier_phase_limit;
+  const double share = carrier ? options_.carrier_phase_white_share : options_.single_point_white_share;
+  const double tau =
+      carrier ? options_.carrier_phase_correlation_time : options_.single_point_correlation_time;
+  const Vector3d sigma = ((1 - share) * total.diagonal()).cwiseSqrt();
+
+  GnssErrorClass& known = core_.gnss_class;
+  if (known.correlation_time != tau) {  // another kind of solution has another, independent bias
+    P_.middleCols<3>(kPositionBias).setZero();
+    P_.middleRows<3>(kPositionBias).setZero();
+    P_.diagonal().segment<3>(kPositionBias) = sigma.cwiseAbs2();
+    core_.state.position_bias.setZero();
+  } else {  // a receiver that announces a larger error has one now, not in two minutes
+    const Vector3d grown = (sigma.cwiseAbs2() - known.bias_sigma.cwiseAbs2()).cwiseMax(0);
+    P_.diagonal().segment<3>(kPositionBias) += grown;
+  }
+  known = {sigma, tau};
+  return share * total;
+}
+
+void Filter::shift_common_position(const Matrix3d& covariance) {
+  // A common shift δ of the world moves every ρ by R^T δ and leaves all relative motion as it is.
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMaxState, 3> G = decltype(G)::Zero(size(), 3);
+  G.middleRows<3>(kRho) = core_.state.X.R.toRotationMatrix().transpose();
+  for (int i = 0; i < clones_; ++i) {
+    G.middleRows<3>(kBase + 6 * i + 3) = clone_poses_[static_cast<std::size_t>(i)].matrix3().transpose();
+  }
+  P_ += G * covariance * G.transpose();
+}
+
+Innovation Filter::update(const GnssFix& fix) {
+  if (!fix.position.allFinite() || !fix.covariance.allFinite()) return {};
+  flush();
+  const Matrix3d white = split_position_noise(fix);
+  const Prediction<3> prediction = predict_gnss_position(core_.state, lever_arm_);
+  const Vector3d residual = fix.position - prediction.value;
+  Innovation innovation = correct<3>(prediction, residual, white, options_.gate_probability_3);
+  if (innovation.verdict == Verdict::rejected) {
+    ++core_.position_rejections;
+    const double silence = seconds_between(core_.position_accepted, core_.state.time);
+    if (silence >= options_.reacquire_after && core_.position_rejections >= kLeastRejections) {
+      const Vector3d before = core_.state.X.p;
+      shift_common_position(residual.cwiseAbs2().asDiagonal());
+      innovation = correct<3>(prediction, residual, white, options_.gate_probability_3, true);
+      innovation.verdict = Verdict::reacquired;
+      innovation.jump = (core_.state.X.p - before).norm();
+    }
+  }
+  if (innovation.verdict != Verdict::rejected && innovation.verdict != Verdict::unusable) {
+    core_.position_accepted = core_.state.time;
+    core_.position_rejections = 0;
+  }
+  return innovation;
+}
+
+Innovation Filter::update(const GnssVelocity& velocity) {
+  if (!velocity.velocity.allFinite() || !velocity.covariance.allFinite()) return {};
+  flush();
+  const Matrix3d noise = floored(velocity.covariance, options_.velocity_sigma_floor);
+  const Prediction<3> prediction = predict_gnss_velocity(core_.state, lever_arm_);
+  const Vector3d residual = velocity.velocity - prediction.value;
+  Innovation innovation = correct<3>(prediction, residual, noise, options_.gate_probability_3);
+  if (innovation.verdict == Verdict::rejected) {
+    ++core_.velocity_rejections;
+    const double silence = seconds_between(core_.velocity_accepted, core_.state.time);
+    if (silence >= options_.reacquire_after && core_.velocity_rejections >= kLeastRejections) {
+      const Vector3d before = core_.state.X.v;
+      P_.diagonal().segment<3>(kNu).array() += residual.squaredNorm();
+      innovation = correct<3>(prediction, residual, noise, options_.gate_probability_3, true);
+      innovation.verdict = Verdict::reacquired;
+      innovation.jump = (core_.state.X.v - before).norm();
+    }
+  }
+  if (innovation.verdict != Verdict::rejected && innovation.verdict != Verdict::unusable) {
+    core_.velocity_accepted = core_.state.time;
+    core_.velocity_seen = true;
+    core_.velocity_rejections = 0;
+  }
+  return innovation;
+}
+
+Innovation Filter::update(const ZeroVelocity& stop) {
+  flush();
+  const Prediction<3> prediction = predict_velocity(core_.state);
+  const double sigma = std::max(stop.sigma, 1e-3);
+  return correct<3>(prediction, -prediction.value, sigma * sigma * Matrix3d::Identity(),
+                    options_.gate_probability_3);
+}
+
+Innovation Filter::update(const BarometricHeight& height) {
+  if (!std::isfinite(height.height) || !std::isfinite(height.sigma)) return {};
+  flush();
+  if (!core_.height_known) {  // the first reading defines the zero
+    core_.height_known = true;
+    core_.state.height_bias = height.height - core_.state.X.p.z();
+    P_.col(kHeightBias).setZero();
+    P_.row(kHeightBias).setZero();
+    P_(kHeightBias, kHeightBias) = options_.barometer_bias_sigma * options_.barometer_bias_sigma;
+  }
+  const Prediction<1> prediction = predict_barometric_height(core_.state);
+  const Eigen::Matrix<double, 1, 1> residual(height.height - prediction.value[0]);
+  const double sigma = std::max(height.sigma, 0.01);
+  return correct<1>(prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
+                    options_.gate_probability_1);
+}
+
+Innovation Filter::update(const Heading& heading) {
+  flush();
+  const auto prediction = predict_azimuth(core_.state, Vector3d::UnitX());
+  if (!prediction || !std::isfinite(heading.yaw) || !std::isfinite(heading.sigma)) return {};
+  const Eigen::Matrix<double, 1, 1> residual(wrap_angle(heading.yaw - prediction->value[0]));
+  const double sigma = std::max(heading.sigma, 1e-3);
+  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
+                    options_.gate_probability_1);
+}
+
+Innovation Filter::update(const MagneticField& field, double declination) {
+  flush();
+  const auto prediction = predict_azimuth(core_.state, field.field);
+  if (!prediction || !std::isfinite(field.sigma)) return {};
+  const double north = 0.5 * std::numbers::pi - declination;
+  const Eigen::Matrix<double, 1, 1> residual(wrap_angle(north - prediction->value[0]));
+  // The azimuth hangs on the horizontal part of the field alone.
+  const Vector3d world = core_.state.X.R * field.field;
+  const double sigma = std::max(field.sigma, 1e-3) * world.norm() / world.head<2>().norm();
+  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
+                    options_.gate_probability_1);
+}
+
+Innovation Filter::update(const RangeToGround& range) {
+  flush();
+  const auto prediction = predict_range(core_.state, range.ground_height);
+  if (!prediction || !std::isfinite(range.range) || !std::isfinite(range.sigma)) return {};
+  const Eigen::Matrix<double, 1, 1> residual(range.range - prediction->value[0]);
+  const double sigma = std::max(range.sigma, 0.005);
+  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
+                    options_.gate_probability_1);
+}
+
+Innovation Filter::update_static_force(const Vector3d& force, double sigma) {
+  flush();
+  const Prediction<3> prediction = predict_static_force(core_.state, options_.gravity);
+  return correct<3>(prediction, force - prediction.value, sigma * sigma * Matrix3d::Identity(),
+                    options_.gate_probability_3, true);
+}
+
+int Filter::clone() {
+  if (clones_ == kMaxClones) return -1;
+  flush();
+  const int n = size();
+  clone_poses_[static_cast<std::size_t>(clones_)] = {core_.state.X.R, core_.state.X.p};
+  P_.conservativeResize(n + 6, n + 6);
+  P_.middleRows(n, 3).leftCols(n) = P_.middleRows<3>(kPhi).leftCols(n).eval();
+  P_.middleRows(n + 3, 3).leftCols(n) = P_.middleRows<3>(kRho).leftCols(n).eval();
+  P_.middleCols(n, 3).topRows(n) = P_.middleRows(n, 3).leftCols(n).transpose().eval();
+  P_.middleCols(n + 3, 3).topRows(n) = P_.middleRows(n + 3, 3).leftCols(n).transpose().eval();
+  P_.block<3, 3>(n, n) = P_.block<3, 3>(kPhi, kPhi).eval();
+  P_.block<3, 3>(n, n + 3) = P_.block<3, 3>(kPhi, kRho).eval();
+  P_.block<3, 3>(n + 3, n) = P_.block<3, 3>(kRho, kPhi).eval();
+  P_.block<3, 3>(n + 3, n + 3) = P_.block<3, 3>(kRho, kRho).eval();
+  return clones_++;
+}
+
+CloneMotion Filter::motion_since(int index) {
+  flush();
+  const Pose& first = clone_poses_[static_cast<std::size_t>(index)];
+  const Pose now{core_.state.X.R, core_.state.X.p};
+  CloneMotion motion;
+  motion.T_1_2 = first.inverse() * now;
+  // ξ_12 = ξ_2 - Ad(T_12^-1) ξ_1
+  const Matrix6d Ad = adjoint(motion.T_1_2.inverse());
+  const int c = kBase + 6 * index;
+  const int pose_rows[2] = {kPhi, kRho};
+  Matrix6d P22;
+  Matrix6d P21;
+  for (int i = 0; i < 2; ++i) {
+    P21.middleRows<3>(3 * i) = P_.block<3, 6>(pose_rows[i], c);
+    for (int j = 0; j < 2; ++j) P22.block<3, 3>(3 * i, 3 * j) = P_.block<3, 3>(pose_rows[i], pose_rows[j]);
+  }
+  const Matrix6d P11 = P_.block<6, 6>(c, c);
+  const Matrix6d sum = P22 - P21 * Ad.transpose() - Ad * P21.transpose() + Ad * P11 * Ad.transpose();
+  motion.covariance = 0.5 * (sum + sum.transpose());
+  return motion;
+}
+
+ExtendedPose Filter::smooth_pose() const {
+  const ExtendedPose& X = core_.state.X;
+  return {(rotation_exp(core_.smooth_rotation) * X.R).normalized(), X.v, X.p + core_.smooth_position};
+}
+
+}  // namespace pade::navigation

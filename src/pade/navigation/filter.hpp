@@ -1,0 +1,142 @@
+// Error-state extended Kalman filter on SE_2(3) with stochastic clones: GPS and INS fused as in Section 4.1
+// of the paper, with the relative pose read from cloned states (Roumeliotis and Burdick, "Stochastic
+// cloning", ICRA 2002).
+//
+// The filter knows no order of arrival and no history: that is the Navigator's. It never allocates.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "pade/core/measurements.hpp"
+#include "pade/navigation/filter_options.hpp"
+#include "pade/navigation/filter_state.hpp"
+#include "pade/navigation/imu_increment.hpp"
+#include "pade/navigation/measurement_models.hpp"
+
+namespace pade::navigation {
+
+inline constexpr int kMaxClones = 10;
+inline constexpr int kMaxState = kBase + 6 * kMaxClones;
+
+/// What became of a measurement.
+enum class Verdict : std::uint8_t {
+  accepted,
+  inflated,    ///< outside the gate, used with its noise enlarged so that it lies on the gate
+  rejected,    ///< far outside
+  reacquired,  ///< after a time of nothing but rejections: the state was opened for it and moved
+  unusable,    ///< not finite, or without meaning in this state
+};
+
+/// Innovation of one measurement; unused components are zero.
+struct Innovation {
+  Verdict verdict = Verdict::unusable;
+  int size = 0;
+  Vector3d residual = Vector3d::Zero();
+  Vector3d sigma = Vector3d::Zero();  ///< predicted, before any inflation
+  double chi_square = 0;
+  double log_likelihood = 0;  ///< of the residual under its predicted covariance, without the constant
+  double jump = 0;  ///< distance the position (or speed the velocity) moved in a re-acquisition, m or m/s
+};
+
+/// Split of a reported GNSS position error into white noise and Gauss-Markov bias.
+struct GnssErrorClass {
+  Vector3d bias_sigma = Vector3d::Zero();
+  double correlation_time = 0;  ///< 0: no bias known yet
+};
+
+/// Everything of the filter but its covariance and clones.
+struct FilterCore {
+  NavigationState state;
+  ImuIncrement pending;  ///< motion since the covariance was valid
+  GnssErrorClass gnss_class;
+  bool height_known = false;                    ///< the barometer's zero has been set
+  Vector3d smooth_position = Vector3d::Zero();  ///< smooth minus filtered position, decaying, ENU, m
+  Vector3d smooth_rotation = Vector3d::Zero();  ///< R_smooth = Exp(smooth_rotation) R, decaying
+  Time position_accepted;                       ///< last time a position passed its gate
+  Time velocity_accepted;                       ///< last time a velocity did
+  bool velocity_seen = false;                   ///< one has since the start
+  double log_likelihood = 0;    ///< of all GNSS innovations since the start, bounded per innovation
+  int position_rejections = 0;  ///< in a row
+  int velocity_rejections = 0;
+};
+
+/// What is kept to come back to: everything but clones.
+struct FilterSnapshot : FilterCore {
+  BaseMatrix P = BaseMatrix::Zero();
+};
+
+/// Motion of the body between two clones or a clone and now.
+struct CloneMotion {
+  Pose T_1_2;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of (rotation, translation), T_1_2 = T̂ exp(ξ): axes of frame 2
+};
+
+class Filter {
+ public:
+  Filter() = default;
+  Filter(const FilterOptions& options, const Vector3d& gnss_lever_arm)
+      : options_(options), lever_arm_(gnss_lever_arm) {}
+
+  /// Starts at a state with the covariance of its error; forgets all clones.
+  void start(const NavigationState& state, const BaseMatrix& covariance);
+
+  [[nodiscard]] const NavigationState& state() const { return core_.state; }
+  [[nodiscard]] const FilterCore& core() const { return core_; }
+  [[nodiscard]] FilterSnapshot snapshot() const;
+  [[nodiscard]] const FilterOptions& options() const { return options_; }
+  /// Goes back to a snapshot; forgets all clones.
+  void restore(const FilterSnapshot& snapshot);
+  /// Covariance of the 19 errors at state().time.
+  BaseMatrix covariance();
+
+  /// Moves the state over the interval between two IMU values by their mean (trapezoid). `to` must not lie
+  /// before state().time.
+  void propagate(Time to, const Vector3d& rate_mean, const Vector3d& force_mean, const Vector3d& rate_end);
+  /// Adds the doubt that a gap of `duration` without samples leaves.
+  void add_gap_noise(double duration);
+
+  Innovation update(const GnssFix& fix);
+  Innovation update(const GnssVelocity& velocity);
+  Innovation update(const BarometricHeight& height);
+  Innovation update(const Heading& heading);
+  /// Uses the azimuth of the field; `declination`: of magnetic north, from north towards east, rad.
+  Innovation update(const MagneticField& field, double declination);
+  Innovation update(const ZeroVelocity& stop);
+  Innovation update(const RangeToGround& range);
+  /// Levelling: the mean specific force of a body known to be unaccelerated.
+  Innovation update_static_force(const Vector3d& force, double sigma);
+
+  /// Remembers the present pose; its index, or -1 where kMaxClones are taken.
+  int clone();
+  void drop_clones();
+  [[nodiscard]] int clones() const { return clones_; }
+  /// Motion from clone `index` to the present pose.
+  CloneMotion motion_since(int index);
+
+  /// The pose without the jumps of corrections: it follows the filtered one with a time constant of 2 s.
+  [[nodiscard]] ExtendedPose smooth_pose() const;
+
+ private:
+  using FullMatrix =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxState, kMaxState>;
+
+  [[nodiscard]] int size() const { return kBase + 6 * clones_; }
+  void flush();
+  /// White part of the fix's covariance; follows the receiver from one error class to another.
+  Matrix3d split_position_noise(const GnssFix& fix);
+  void shift_common_position(const Matrix3d& covariance);
+  template <int M>
+  Innovation correct(const Prediction<M>& prediction, const Eigen::Matrix<double, M, 1>& residual,
+                     Eigen::Matrix<double, M, M> noise, double gate, bool force = false);
+  void apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1>& error);
+
+  FilterOptions options_;
+  Vector3d lever_arm_ = Vector3d::Zero();
+  FilterCore core_;
+  FullMatrix P_ = FullMatrix::Zero(kBase, kBase);  // base errors, then (φ, ρ) of each clone
+  std::array<Pose, kMaxClones> clone_poses_;
+  int clones_ = 0;
+};
+
+}  // namespace pade::navigation

@@ -1,0 +1,92 @@
+// The constants of the filter: one set per class of sensor, never per recording.
+#pragma once
+
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "pade/core/options.hpp"
+
+namespace pade::navigation {
+
+enum class ImuClass { industrial, consumer };
+
+struct FilterOptions {
+  double gravity = 9.80665;  ///< m/s², along world -z; the Earth's rate is below the noise of these sensors
+
+  // White noise as seen in flight. Rotor vibration and aliasing make it far larger than data sheets say.
+  double gyroscope_noise = 4e-4;          ///< rad/s/sqrt(Hz)
+  double accelerometer_noise = 3e-2;      ///< m/s²/sqrt(Hz)
+  double gyroscope_bias_walk = 2e-4;      ///< rad/s/sqrt(s)
+  double accelerometer_bias_walk = 1e-3;  ///< m/s²/sqrt(s)
+  double gyroscope_bias_sigma = 0.05;     ///< before the first levelling, rad/s
+  double accelerometer_bias_sigma = 0.1;  ///< m/s²
+  double gyroscope_range = 17;            ///< a sample beyond it is saturated, rad/s
+  double accelerometer_range = 155;       ///< m/s²
+
+  // What may happen between two samples farther apart than `gap`.
+  double gap = 0.06;            ///< s
+  double gap_rate = 0.5;        ///< rms of the unseen angular rate, rad/s
+  double gap_acceleration = 2;  ///< rms of the unseen acceleration, m/s²
+
+  // GNSS positions: the reported variance is split into white noise and a Gauss-Markov bias.
+  double single_point_white_share = 0.0588;    ///< of the variance (0.25 m of 1.03 m)
+  double single_point_correlation_time = 120;  ///< s
+  double carrier_phase_white_share = 0.8;      ///< (1 cm of 1.12 cm)
+  double carrier_phase_correlation_time = 60;  ///< s
+  double carrier_phase_limit = 0.1;            ///< reported horizontal sigma that divides the two, m
+  double position_sigma_floor = 0.005;         ///< of a fix that claims less (or zero), m
+  double velocity_sigma_floor = 0.01;          ///< m/s
+
+  double barometer_bias_sigma = 20;          ///< of its unknown zero, m
+  double barometer_correlation_time = 3000;  ///< s
+
+  // Robustness.
+  double gate_probability_3 = 16.27;  ///< chi-square bound of 3 degrees of freedom (99.9 %)
+  double gate_probability_1 = 10.83;  ///< of 1 degree of freedom
+  double soft_gate = 3;  ///< up to this multiple of the bound a measurement is kept with inflated noise
+  double reacquire_after = 1.0;  ///< seconds of nothing but rejections after which the sensor is believed
+
+  static FilterOptions of(ImuClass imu);
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("gravity", self.gravity, "m/s², downwards");
+    field("gyroscope_noise", self.gyroscope_noise, "white noise in flight, rad/s/sqrt(Hz)");
+    field("accelerometer_noise", self.accelerometer_noise, "white noise in flight, m/s²/sqrt(Hz)");
+    field("gyroscope_bias_walk", self.gyroscope_bias_walk, "rad/s/sqrt(s)");
+    field("accelerometer_bias_walk", self.accelerometer_bias_walk, "m/s²/sqrt(s)");
+    field("gyroscope_bias_sigma", self.gyroscope_bias_sigma, "before levelling, rad/s");
+    field("accelerometer_bias_sigma", self.accelerometer_bias_sigma, "before levelling, m/s²");
+    field("gyroscope_range", self.gyroscope_range, "saturation, rad/s");
+    field("accelerometer_range", self.accelerometer_range, "saturation, m/s²");
+    field("gap", self.gap, "samples farther apart than this leave a gap, s");
+    field("gap_rate", self.gap_rate, "rms angular rate assumed in a gap, rad/s");
+    field("gap_acceleration", self.gap_acceleration, "rms acceleration assumed in a gap, m/s²");
+    field("single_point_white_share", self.single_point_white_share, "white share of the reported variance");
+    field("single_point_correlation_time", self.single_point_correlation_time, "of the Gauss-Markov bias, s");
+    field("carrier_phase_white_share", self.carrier_phase_white_share,
+          "white share of the reported variance");
+    field("carrier_phase_correlation_time", self.carrier_phase_correlation_time,
+          "of the Gauss-Markov bias, s");
+    field("carrier_phase_limit", self.carrier_phase_limit, "reported sigma that divides the two classes, m");
+    field("position_sigma_floor", self.position_sigma_floor, "least sigma of a fix, m");
+    field("velocity_sigma_floor", self.velocity_sigma_floor, "least sigma of a velocity, m/s");
+    field("barometer_bias_sigma", self.barometer_bias_sigma, "of the barometer's zero, m");
+    field("barometer_correlation_time", self.barometer_correlation_time, "of the barometer's zero, s");
+    field("gate_probability_3", self.gate_probability_3, "chi-square gate, 3 degrees of freedom");
+    field("gate_probability_1", self.gate_probability_1, "chi-square gate, 1 degree of freedom");
+    field("soft_gate", self.soft_gate, "multiple of the gate up to which noise is inflated instead");
+    field("reacquire_after", self.reacquire_after, "seconds of rejections before a sensor is believed again");
+  }
+};
+
+}  // namespace pade::navigation
+
+template <>
+struct pade::EnumNames<pade::navigation::ImuClass> {
+  static constexpr std::array names = {
+      std::pair{pade::navigation::ImuClass::industrial, std::string_view("industrial")},
+      std::pair{pade::navigation::ImuClass::consumer, std::string_view("consumer")},
+  };
+};

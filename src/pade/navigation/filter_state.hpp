@@ -1,0 +1,46 @@
+// The state of the filter and its error, one notation for code and docs/navigation.md.
+//
+// Error (19): φ rotation, ν velocity, ρ position (left-invariant: X = X̂ exp(ξ), so all in body axes), then
+// δb_g, δb_a, δb_p (GNSS position bias, ENU) and δb_h (barometer zero), additive.
+#pragma once
+
+#include "pade/core/time.hpp"
+#include "pade/navigation/lie.hpp"
+
+namespace pade::navigation {
+
+inline constexpr int kPhi = 0;
+inline constexpr int kNu = 3;
+inline constexpr int kRho = 6;
+inline constexpr int kGyroscopeBias = 9;
+inline constexpr int kAccelerometerBias = 12;
+inline constexpr int kCore = 15;
+inline constexpr int kPositionBias = 15;
+inline constexpr int kHeightBias = 18;
+inline constexpr int kBase = 19;
+
+using BaseVector = Eigen::Matrix<double, kBase, 1>;
+using BaseMatrix = Eigen::Matrix<double, kBase, kBase>;
+
+/// The estimate without its covariance.
+struct NavigationState {
+  Time time;
+  ExtendedPose X;                                  ///< T_world_body and the velocity, ENU
+  Vector3d gyroscope_bias = Vector3d::Zero();      ///< rad/s
+  Vector3d accelerometer_bias = Vector3d::Zero();  ///< m/s²
+  Vector3d position_bias = Vector3d::Zero();       ///< of GNSS positions, ENU, m
+  double height_bias = 0;                          ///< of the barometer, m
+  Vector3d angular_rate = Vector3d::Zero();        ///< bias-corrected, at `time`, for lever arms
+
+  /// Moves the estimate by an error: X exp(ξ), biases added.
+  void retract(const BaseVector& error) {
+    X = X * ExtendedPose::exp(error.head<9>());
+    gyroscope_bias += error.segment<3>(kGyroscopeBias);
+    angular_rate -= error.segment<3>(kGyroscopeBias);
+    accelerometer_bias += error.segment<3>(kAccelerometerBias);
+    position_bias += error.segment<3>(kPositionBias);
+    height_bias += error[kHeightBias];
+  }
+};
+
+}  // namespace pade::navigation

@@ -1,0 +1,174 @@
+// GPS/INS navigation for depth estimation: sensor data in (in any order, late, with gaps), relative pose of
+// the camera between any two times of the recent past out, with covariance and health. Section 4.1 of the
+// paper.
+//
+// One thread; no allocation after construction.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string_view>
+
+#include "pade/core/measurements.hpp"
+#include "pade/core/options.hpp"
+#include "pade/core/pose.hpp"
+#include "pade/navigation/alignment.hpp"
+#include "pade/navigation/timeline.hpp"
+
+namespace pade::navigation {
+
+struct NavigatorOptions {
+  FilterOptions filter;
+  AlignmentOptions alignment;
+  Vector3d gnss_lever_arm = Vector3d::Zero();  ///< antenna in the body frame, m
+  double gnss_position_latency = 0;            ///< subtracted from the stamps of sensors that stamp late, s
+  double gnss_velocity_latency = 0;            ///< s
+  double barometer_latency = 0;                ///< s
+  double magnetometer_latency = 0;             ///< s
+  double camera_time_offset = 0;               ///< t_imu = t_image + offset, s
+  double declination = 0;                      ///< of magnetic north, towards east, rad
+  double history = 2;                          ///< seconds that late data and questions may reach back
+  double imu_rate = 500;                       ///< highest expected, Hz; sizes the buffers
+  double dead_reckoning_after = 1;             ///< seconds without GNSS velocity
+  double longest_gap = 3;                      ///< without IMU data; beyond it the filter starts anew, s
+  double scale_error_limit = 0.2;              ///< of the baseline: the noise bound of the paper
+  double scale_error_sigmas = 1.75;            ///< `scale_valid` asks for limit * baseline > this * sigma
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("filter", self.filter, "noise and gates");
+    field("alignment", self.alignment, "the start");
+    field("gnss_lever_arm_x", self.gnss_lever_arm[0], "antenna in the body frame, forward, m");
+    field("gnss_lever_arm_y", self.gnss_lever_arm[1], "antenna in the body frame, left, m");
+    field("gnss_lever_arm_z", self.gnss_lever_arm[2], "antenna in the body frame, up, m");
+    field("gnss_position_latency", self.gnss_position_latency, "s");
+    field("gnss_velocity_latency", self.gnss_velocity_latency, "s");
+    field("barometer_latency", self.barometer_latency, "s");
+    field("magnetometer_latency", self.magnetometer_latency, "s");
+    field("camera_time_offset", self.camera_time_offset, "t_imu = t_image + offset, s");
+    field("declination", self.declination, "of magnetic north, towards east, rad");
+    field("history", self.history, "seconds that late data and questions may reach back");
+    field("imu_rate", self.imu_rate, "highest expected, Hz");
+    field("dead_reckoning_after", self.dead_reckoning_after, "seconds without GNSS velocity");
+    field("longest_gap", self.longest_gap, "without IMU data; beyond it the filter starts anew, s");
+    field("scale_error_limit", self.scale_error_limit, "error of the baseline that spoils depth, relative");
+    field("scale_error_sigmas", self.scale_error_sigmas, "sigmas that must fit into it");
+  }
+};
+
+enum class NavigationStatus : std::uint8_t {
+  uninitialised,
+  levelled,   ///< attitude but for yaw
+  yaw_known,  ///< no GNSS velocity has confirmed it yet
+  navigating,
+  dead_reckoning,  ///< no GNSS velocity for a while
+};
+
+struct Health {
+  NavigationStatus status = NavigationStatus::uninitialised;
+  double seconds_since_velocity = 0;  ///< since one passed its gate
+  double seconds_since_position = 0;
+  double yaw_sigma = 0;           ///< rad
+  std::uint64_t imu_refused = 0;  ///< not finite, or not later than the one before
+  std::uint64_t imu_gaps = 0;
+  std::uint64_t too_late = 0;    ///< measurements older than the history
+  std::uint64_t duplicates = 0;  ///< same sensor, same stamp
+  std::uint64_t unusable = 0;    ///< not finite
+  std::uint64_t restarts = 0;    ///< after a gap too long to bridge
+};
+
+/// The answer to a question that cannot always be answered.
+enum class Answer : std::uint8_t {
+  valid,
+  not_initialised,
+  too_old,  ///< before the history
+  too_new,  ///< after the newest IMU sample
+};
+
+struct RelativePose {
+  Answer answer = Answer::not_initialised;
+  /// Reference: the camera at t1, other: at t2. Covariance as RelativeMotion has it.
+  RelativeMotion motion;
+  bool scale_valid = false;  ///< the baseline is longer than its doubt allows
+  NavigationStatus status = NavigationStatus::uninitialised;
+};
+
+struct AbsolutePose {
+  Answer answer = Answer::not_initialised;
+  Pose T_world_body;                       ///< global: jumps with corrections
+  Pose T_smooth_body;                      ///< without jumps; drifts towards the global one within seconds
+  Vector3d velocity = Vector3d::Zero();    ///< ENU, m/s
+  Matrix9d covariance = Matrix9d::Zero();  ///< of (φ, ν, ρ), body axes (filter_state.hpp)
+  Vector3d gyroscope_bias = Vector3d::Zero();      ///< rad/s
+  Vector3d accelerometer_bias = Vector3d::Zero();  ///< m/s²
+};
+
+class Navigator {
+ public:
+  explicit Navigator(const NavigatorOptions& options);
+
+  // Each stamped at the moment of measurement (less the sensor's latency), in any order. Refused data is
+  // counted.
+  void add(const ImuSample& sample);
+  void add(const GnssFix& fix);
+  void add(const GnssVelocity& velocity);
+  void add(const BarometricHeight& height);
+  void add(const Heading& heading);
+  void add(const MagneticField& field);
+  void add(const ZeroVelocity& stop);
+  void add(const RangeToGround& range);
+
+  /// Motion of the camera from image time t1 to image time t2 (t2 >= t1), from a clone at t1 within a replay
+  /// that ends at t2: nothing stamped after t2 is used, however late the question comes.
+  RelativePose relative_pose(Time t1, Time t2, const Pose& T_body_camera);
+  /// The state at image time t, with what was measured until then.
+  AbsolutePose absolute_pose(Time t);
+
+  [[nodiscard]] Health health();
+  [[nodiscard]] Time newest() const { return newest_; }
+  /// Called with each measurement when it leaves the history, with the innovation of its last use.
+  void on_retired(std::function<void(const Measurement&)> sink) { sink_ = std::move(sink); }
+  /// Retires everything: at the end of a log.
+  void finish();
+
+ private:
+  struct Keyframe {
+    Time time;
+    FilterSnapshot snapshot;
+  };
+
+  void add(Measurement measurement, double latency, bool finite);
+  void advance_live(Time to);
+  void restart();
+  void retire(Time before);
+  bool load_scratch(Time t, Answer& answer);
+  [[nodiscard]] Time imu_time(Time image) const;
+  [[nodiscard]] NavigationStatus status_of(Filter& filter) const;
+
+  NavigatorOptions options_;
+  Timeline timeline_;
+  Alignment alignment_;
+  AlignmentPhase phase_ = AlignmentPhase::waiting;
+  Filter live_;
+  Filter scratch_;
+  TimeRing<Keyframe> keyframes_;
+  bool has_imu_ = false;
+  Time newest_;
+  Health health_;
+  std::function<void(const Measurement&)> sink_;
+};
+
+}  // namespace pade::navigation
+
+template <>
+struct pade::EnumNames<pade::navigation::NavigationStatus> {
+  using Status = pade::navigation::NavigationStatus;
+  static constexpr std::array names = {
+      std::pair{Status::uninitialised, std::string_view("uninitialised")},
+      std::pair{Status::levelled, std::string_view("levelled")},
+      std::pair{Status::yaw_known, std::string_view("yaw_known")},
+      std::pair{Status::navigating, std::string_view("navigating")},
+      std::pair{Status::dead_reckoning, std::string_view("dead_reckoning")},
+  };
+};

@@ -1,0 +1,76 @@
+#include "pade/navigation/replay.hpp"
+
+#include <algorithm>
+
+#include "pade/core/random.hpp"
+
+namespace pade::navigation {
+namespace {
+
+enum class Kind : std::uint8_t { heading, velocity, fix, barometer, magnetometer, imu };
+
+struct Arrival {
+  Time time;
+  Kind kind;
+  std::size_t index;
+};
+
+}  // namespace
+
+void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions& options,
+            const std::function<void(Time)>& after_imu) {
+  std::vector<Arrival> arrivals;
+  Random random(options.seed);
+  const auto schedule = [&](const auto& items, Kind kind, bool delayed) {
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      const double delay = delayed ? random.uniform(options.gnss_delay_low, options.gnss_delay_high) : 0;
+      if (items[i].time < options.from || items[i].time > options.to) continue;
+      arrivals.push_back({Time{items[i].time.nanoseconds + Time::from_seconds(delay).nanoseconds}, kind, i});
+    }
+  };
+  schedule(options.headings, Kind::heading, false);
+  schedule(log.gnss.velocities, Kind::velocity, true);
+  schedule(log.gnss.fixes, Kind::fix, true);
+  schedule(log.barometer, Kind::barometer, false);
+  schedule(log.magnetometer, Kind::magnetometer, false);
+  // A log keeps the order in which its IMU was written, also where stamps go back; the Navigator judges that.
+  const std::size_t aiding = arrivals.size();
+  schedule(log.imu, Kind::imu, false);
+  std::stable_sort(arrivals.begin(), arrivals.begin() + static_cast<std::ptrdiff_t>(aiding),
+                   [](const Arrival& a, const Arrival& b) { return a.time < b.time; });
+
+  std::size_t next = 0;
+  const auto play_aiding = [&](Time until) {
+    for (; next < aiding && arrivals[next].time <= until; ++next) {
+      const std::size_t i = arrivals[next].index;
+      switch (arrivals[next].kind) {
+        case Kind::heading:
+          navigator.add(options.headings[i]);
+          break;
+        case Kind::velocity:
+          navigator.add(log.gnss.velocities[i]);
+          break;
+        case Kind::fix:
+          navigator.add(log.gnss.fixes[i]);
+          break;
+        case Kind::barometer:
+          navigator.add(log.barometer[i]);
+          break;
+        case Kind::magnetometer:
+          navigator.add(log.magnetometer[i]);
+          break;
+        case Kind::imu:
+          break;
+      }
+    }
+  };
+  for (std::size_t k = aiding; k < arrivals.size(); ++k) {
+    play_aiding(arrivals[k].time);
+    navigator.add(log.imu[arrivals[k].index]);
+    if (after_imu) after_imu(arrivals[k].time);
+  }
+  play_aiding(Time{INT64_MAX});
+  navigator.finish();
+}
+
+}  // namespace pade::navigation

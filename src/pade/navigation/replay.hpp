@@ -1,0 +1,26 @@
+// Plays a log into a Navigator in the order in which the data would have arrived.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "pade/core/navigation_log.hpp"
+#include "pade/navigation/navigator.hpp"
+
+namespace pade::navigation {
+
+struct ReplayOptions {
+  Time from{INT64_MIN};  ///< data stamped before is not played
+  Time to{INT64_MAX};
+  double gnss_delay_low = 0;      ///< GNSS arrives this much after its stamp, drawn uniformly per message
+  double gnss_delay_high = 0;     ///< (so that messages overtake each other), s
+  std::uint64_t seed = 1;         ///< of the delays
+  std::vector<Heading> headings;  ///< further measurements
+};
+
+/// Calls `after_imu(stamp)` behind each IMU sample. At one moment aiding data arrives before the IMU sample.
+void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions& options,
+            const std::function<void(Time)>& after_imu);
+
+}  // namespace pade::navigation

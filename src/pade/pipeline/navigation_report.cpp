@@ -1,0 +1,250 @@
+#include "pade/pipeline/navigation_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "pade/evaluation/report_style.hpp"
+
+namespace pade {
+namespace {
+
+struct Series {
+  std::string name;
+  std::string colour;
+  std::vector<double> x;
+  std::vector<double> y;
+  bool dots = false;
+
+  void add(double at, double value) {
+    if (!std::isfinite(at) || !std::isfinite(value)) return;
+    x.push_back(at);
+    y.push_back(value);
+  }
+};
+
+/// Tick distance: 1, 2 or 5 times a power of ten, about five of them in the range.
+double tick_step(double range) {
+  const double rough = range / 5;
+  const double power = std::pow(10, std::floor(std::log10(rough)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= rough) return factor * power;
+  }
+  return 10 * power;
+}
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void include(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  void pad() {
+    if (!(high > low)) {
+      const double middle = std::isfinite(low) ? low : 0;
+      low = middle - 0.5;
+      high = middle + 0.5;
+    }
+    const double margin = 0.04 * (high - low);
+    low -= margin;
+    high += margin;
+  }
+};
+
+/// A line plot; `equal`: same scale on both axes.
+std::string plot(const std::string& title, const std::string& x_label, const std::string& y_label,
+                 const std::vector<Series>& series, bool equal) {
+  constexpr double kWidth = 760;
+  constexpr double kLeft = 62;
+  constexpr double kTop = 12;
+  const double height = equal ? 520 : 250;
+  const double inner_width = kWidth - kLeft - 12;
+  const double inner_height = height - kTop - 42;
+  Range x;
+  Range y;
+  for (const Series& s : series) {
+    for (const double value : s.x) x.include(value);
+    for (const double value : s.y) y.include(value);
+  }
+  x.pad();
+  y.pad();
+  if (equal) {
+    const double scale = std::max((x.high - x.low) / inner_width, (y.high - y.low) / inner_height);
+    const auto widen = [&](Range& r, double pixels) {
+      const double middle = 0.5 * (r.low + r.high);
+      r = {middle - 0.5 * scale * pixels, middle + 0.5 * scale * pixels};
+    };
+    widen(x, inner_width);
+    widen(y, inner_height);
+  }
+  const auto px = [&](double v) { return kLeft + (v - x.low) / (x.high - x.low) * inner_width; };
+  const auto py = [&](double v) { return kTop + (y.high - v) / (y.high - y.low) * inner_height; };
+
+  std::string svg;
+  const auto out = std::back_inserter(svg);
+  fmt::format_to(out,
+                 "<figure><figcaption>{}</figcaption><svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" "
+                 "aria-label=\"{}\">\n",
+                 title, kWidth, height, title);
+  fmt::format_to(out,
+                 "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#8893a0\"/>\n",
+                 kLeft, kTop, inner_width, inner_height);
+  const double dx = tick_step(x.high - x.low);
+  for (double v = std::ceil(x.low / dx) * dx; v <= x.high; v += dx) {
+    fmt::format_to(out,
+                   "<path d=\"M{:.1f} {:.1f}v4\" stroke=\"#8893a0\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
+                   "text-anchor=\"middle\">{:.6g}</text>\n",
+                   px(v), kTop + inner_height, px(v), kTop + inner_height + 17,
+                   std::abs(v) < 1e-9 * dx ? 0 : v);
+  }
+  const double dy = tick_step(y.high - y.low);
+  for (double v = std::ceil(y.low / dy) * dy; v <= y.high; v += dy) {
+    fmt::format_to(out,
+                   "<path d=\"M{:.1f} {:.1f}h{:.1f}\" stroke=\"#8893a033\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
+                   "text-anchor=\"end\">{:.6g}</text>\n",
+                   kLeft, py(v), inner_width, kLeft - 6, py(v) + 4, std::abs(v) < 1e-9 * dy ? 0 : v);
+  }
+  fmt::format_to(out, "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n",
+                 kLeft + 0.5 * inner_width, height - 6, x_label);
+  fmt::format_to(out,
+                 "<text transform=\"translate(13 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+                 kTop + 0.5 * inner_height, y_label);
+  for (const Series& s : series) {
+    if (s.dots) {
+      fmt::format_to(out, "<g fill=\"{}\" fill-opacity=\"0.6\">", s.colour);
+      for (std::size_t i = 0; i < s.x.size(); ++i)
+        fmt::format_to(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.3\"/>", px(s.x[i]), py(s.y[i]));
+      svg += "</g>\n";
+    } else if (!s.x.empty()) {
+      fmt::format_to(out, "<path fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" d=\"", s.colour);
+      for (std::size_t i = 0; i < s.x.size(); ++i)
+        fmt::format_to(out, "{}{:.1f} {:.1f}", i == 0 ? 'M' : 'L', px(s.x[i]), py(s.y[i]));
+      svg += "\"/>\n";
+    }
+  }
+  double legend = kLeft + 10;
+  for (const Series& s : series) {
+    fmt::format_to(out,
+                   "<rect x=\"{:.1f}\" y=\"{}\" width=\"12\" height=\"4\" fill=\"{}\"/><text x=\"{:.1f}\" "
+                   "y=\"{}\">{}</text>\n",
+                   legend, kTop + 11, s.colour, legend + 17, kTop + 17, s.name);
+    legend += 30 + 7.0 * static_cast<double>(s.name.size());
+  }
+  svg += "</svg></figure>\n";
+  return svg;
+}
+
+const std::array<std::string, 3> kColours = {"#0072b2", "#d55e00", "#009e73"};
+const std::array<std::string, 3> kAxes = {"east", "north", "up"};
+
+std::string innovation_plot(const NavigationRun& run, navigation::SensorKind kind, const std::string& title,
+                            const std::string& unit) {
+  std::vector<Series> series;
+  for (std::size_t axis = 0; axis < 3; ++axis) series.push_back({kAxes[axis], kColours[axis], {}, {}, true});
+  Series upper{"3 sigma, east", "#999999", {}, {}, false};
+  for (const navigation::Measurement& m : run.measurements) {
+    if (m.kind != kind || m.innovation.size != 3 || m.innovation.sigma.x() > 100) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<Eigen::Index>(axis);
+      series[axis].add(m.time.seconds(), m.innovation.residual[a]);
+    }
+    upper.add(m.time.seconds(), 3 * m.innovation.sigma.x());
+  }
+  if (series[0].x.empty()) return {};
+  series.push_back(upper);
+  return plot(title, "time, s", "innovation, " + unit, series, false);
+}
+
+std::string path_plots(const NavigationLog& log, const NavigationRun& run) {
+  Series path{"filter", kColours[0], {}, {}, false};
+  Series fixes{"GNSS", "#999999", {}, {}, true};
+  Series truth{"truth", kColours[1], {}, {}, false};
+  Series speed{"speed", kColours[0], {}, {}, false};
+  Series true_speed{"true speed", kColours[1], {}, {}, false};
+  for (const NavigationFrame& f : run.frames) {
+    path.add(f.pose.T_world_body.translation.x(), f.pose.T_world_body.translation.y());
+    speed.add(f.time.seconds(), f.pose.velocity.norm());
+    if (const auto t = evaluation::truth_at(log.truth, f.time)) {
+      truth.add(t->T_world_body.translation.x(), t->T_world_body.translation.y());
+      true_speed.add(f.time.seconds(), t->velocity.norm());
+    }
+  }
+  for (const GnssFix& fix : log.gnss.fixes) fixes.add(fix.position.x(), fix.position.y());
+  std::vector<Series> map = {fixes, path};
+  std::vector<Series> speeds = {speed};
+  if (!truth.x.empty()) {
+    map.push_back(truth);
+    speeds.push_back(true_speed);
+  }
+  return plot("Path", "east, m", "north, m", map, true) + plot("Speed", "time, s", "m/s", speeds, false);
+}
+
+std::string baseline_plot(const NavigationLog& log, const NavigationRun& run) {
+  Series sigma{"predicted sigma", kColours[0], {}, {}, false};
+  Series error{"error against truth", kColours[1], {}, {}, true};
+  for (const FrameMotion& m : run.motions) {
+    const double s = 100 * std::sqrt(m.pose.motion.covariance.topLeftCorner<3, 3>().trace());
+    sigma.add(m.t2.seconds(), s);
+    const auto e = evaluation::score({m.t1, m.t2, m.pose.motion, m.pose.scale_valid}, log.truth);
+    if (e) error.add(m.t2.seconds(), 100 * e->translation);
+  }
+  std::vector<Series> series;
+  if (!error.x.empty()) series.push_back(error);
+  series.push_back(sigma);
+  return plot("Baseline between neighbouring frames", "time, s", "cm", series, false);
+}
+
+std::string health_table(const NavigationRun& run) {
+  std::array<std::size_t, 5> verdicts{};
+  std::string jumps;
+  for (const navigation::Measurement& m : run.measurements) {
+    ++verdicts[static_cast<std::size_t>(m.innovation.verdict)];
+    if (m.innovation.verdict == navigation::Verdict::reacquired) {
+      fmt::format_to(std::back_inserter(jumps), "<tr><td>re-acquired at {} s</td><td>{:.2f}</td></tr>\n",
+                     to_string(m.time), m.innovation.jump);
+    }
+  }
+  const navigation::Health& h = run.health;
+  return fmt::format(
+      "<table><tr><th>health</th><th></th></tr>\n<tr><td>status at the end</td><td>{}</td></tr>\n"
+      "<tr><td>frames with / without answer</td><td>{} / {}</td></tr>\n"
+      "<tr><td>measurements accepted / inflated / rejected / re-acquired / before the start or "
+      "unusable</td><td>{} / {} / {} / {} / {}</td></tr>\n"
+      "<tr><td>IMU samples refused, gaps</td><td>{}, {}</td></tr>\n"
+      "<tr><td>measurements too late, repeated, not finite</td><td>{}, {}, {}</td></tr>\n{}</table>\n",
+      to_name(h.status), run.frames.size(), run.frames_without_answer, verdicts[0], verdicts[1], verdicts[2],
+      verdicts[3], verdicts[4], h.imu_refused, h.imu_gaps, h.too_late, h.duplicates, h.unusable, jumps);
+}
+
+}  // namespace
+
+std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run) {
+  std::string html = fmt::format(
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}"
+      "svg.plot {{ width: 100%; max-width: 860px; display: block; background: #fff; "
+      "}}</style></head><body><main>\n<h1>{}</h1>\n",
+      title, evaluation::report_style, title);
+  for (const std::string& remark : log.remarks) html += "<p>" + remark + "</p>\n";
+  if (run.score) {
+    html += fmt::format(
+        "<table><tr><th>against truth, neighbouring frames</th><th></th></tr>\n"
+        "<tr><td>translation, median / 95 %</td><td>{:.2f} / {:.2f} cm</td></tr>\n"
+        "<tr><td>rotation, 95 %</td><td>{:.4f}°</td></tr>\n<tr><td>mean NEES of the translation (3 "
+        "expected)</td><td>{:.2f}</td></tr>\n"
+        "<tr><td>pairs</td><td>{}</td></tr></table>\n",
+        100 * run.score->translation_median, 100 * run.score->translation_95,
+        run.score->rotation_95 * 180 / M_PI, run.score->nees_mean, run.score->pairs);
+  }
+  html += health_table(run) + path_plots(log, run) + baseline_plot(log, run);
+  html += innovation_plot(run, navigation::SensorKind::gnss_velocity, "GNSS velocity", "m/s");
+  html += innovation_plot(run, navigation::SensorKind::gnss_position, "GNSS position", "m");
+  return html + "</main></body></html>\n";
+}
+
+}  // namespace pade

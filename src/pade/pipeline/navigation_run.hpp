@@ -1,0 +1,85 @@
+// A log played through the navigation filter: the trajectory, the motion between frames, innovations and
+// health. Also the way from a sequence's imu.csv and gnss.csv to camera poses.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pade/core/navigation_log.hpp"
+#include "pade/core/result.hpp"
+#include "pade/evaluation/navigation_score.hpp"
+#include "pade/io/navigation_log.hpp"
+#include "pade/navigation/navigator.hpp"
+
+namespace pade {
+
+struct NavigationRunOptions {
+  navigation::NavigatorOptions navigator;
+  std::vector<Time> frames;        ///< image times; empty: every `1 / rate` seconds of the IMU log
+  double rate = 10;                ///< Hz
+  Pose T_body_camera;              ///< of the motions; the trajectory is the body's
+  std::optional<Heading> heading;  ///< a yaw known at the start
+};
+
+/// The state at one frame.
+struct NavigationFrame {
+  Time time;
+  navigation::AbsolutePose pose;
+  navigation::NavigationStatus status = navigation::NavigationStatus::uninitialised;
+};
+
+/// The motion of the camera from one frame to the next.
+struct FrameMotion {
+  Time t1;
+  Time t2;
+  navigation::RelativePose pose;
+};
+
+struct NavigationRun {
+  std::vector<NavigationFrame> frames;                ///< only those with an answer
+  std::vector<FrameMotion> motions;                   ///< of neighbouring frames with an answer
+  std::vector<navigation::Measurement> measurements;  ///< each with its last innovation
+  navigation::Health health;
+  std::size_t frames_without_answer = 0;
+  std::optional<evaluation::MotionSummary> score;  ///< body motion against log.truth, where there is truth
+};
+
+/// Plays the whole log in the order of its stamps. Every frame is answered causally, as in flight.
+NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOptions& options);
+
+/// The files of a run: "trajectory.txt" (TUM, T_world_body), "relative_motion.csv" (t1, t2, translation and
+/// quaternion x y z w of frame 2 in frame 1, upper triangle of the 6x6 covariance of translation and rotation
+/// vector, flags).
+std::string format_trajectory(const NavigationRun& run);
+std::string format_relative_motion(const NavigationRun& run);
+
+/// Camera poses from inertial and GNSS data for a pipeline that takes poses.
+struct CameraTrajectory {
+  std::vector<Time> times;  ///< of the frames with a pose, rising
+  std::vector<Pose> poses;  ///< T_world_camera; the motion between neighbours is `motions`, exactly
+  std::vector<RelativeMotion> motions;   ///< from frame i (reference) to frame i + 1, with covariance
+  std::vector<bool> scale_valid;         ///< of each motion
+  std::optional<GeodeticOrigin> origin;  ///< of the world, where the GNSS log has one
+  navigation::Health health;
+};
+
+/// What of a camera's calibration matters here.
+struct CameraMounting {
+  Pose T_body_camera;
+  double time_offset = 0;                         ///< t_imu = t_image + offset, s
+  std::optional<Eigen::Vector3d> gnss_lever_arm;  ///< body, m; else what the GNSS log says
+};
+
+/// Runs the filter on imu.csv and gnss.csv (and baro.csv, mag.csv) of a sequence folder. The first pose is
+/// the filter's own; each further one adds the relative motion read from clones, so that corrections of the
+/// absolute position never appear as motion (the price: the chain drifts from the GNSS by the integral of the
+/// velocity's error). Frames before the filter knows its yaw have no pose. Errors: a log that cannot be read;
+/// no frame with a pose.
+Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
+                                                         const std::vector<Time>& frames,
+                                                         const CameraMounting& mounting,
+                                                         const navigation::NavigatorOptions& options = {});
+
+}  // namespace pade
