@@ -3,8 +3,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include "../tests/navigation/flight.hpp"
 #include "pade/navigation/navigator.hpp"
+
+#include "../tests/navigation/flight.hpp"
 
 namespace pade::navigation {
 namespace {
@@ -41,8 +42,8 @@ void FilterWithTwoClones(benchmark::State& state) {
     for (std::size_t i = 1; i < log.imu.size(); ++i) {
       const ImuSample& a = log.imu[i - 1];
       const ImuSample& b = log.imu[i];
-      filter.propagate(b.time, 0.5 * (a.angular_rate + b.angular_rate), 0.5 * (a.specific_force + b.specific_force),
-                       b.angular_rate);
+      filter.propagate(b.time, 0.5 * (a.angular_rate + b.angular_rate),
+                       0.5 * (a.specific_force + b.specific_force), b.angular_rate);
       if (epoch < log.gnss.fixes.size() && log.gnss.fixes[epoch].time <= b.time) {
         filter.update(log.gnss.velocities[epoch]);
         filter.update(log.gnss.fixes[epoch++]);

@@ -24,14 +24,20 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         for (const auto& velocity : read->velocities) PADE_EXPECT(velocity.velocity.allFinite());
       }
       break;
-    case 2: (void)pade::io::parse_barometer(text, "baro", remarks); break;
-    case 3: (void)pade::io::parse_magnetometer(text, "mag", remarks); break;
+    case 2:
+      (void)pade::io::parse_barometer(text, "baro", remarks);
+      break;
+    case 3:
+      (void)pade::io::parse_magnetometer(text, "mag", remarks);
+      break;
     case 4:
       if (const auto read = pade::io::parse_truth(text, "truth", remarks)) {
         for (const auto& s : *read) PADE_EXPECT(s.T_world_body.is_finite());
       }
       break;
-    default: (void)pade::io::parse_stamps(text, "stamps"); break;
+    default:
+      (void)pade::io::parse_stamps(text, "stamps");
+      break;
   }
   return 0;
 }

@@ -145,10 +145,10 @@ Result<Trajectory> Trajectory::through(const std::vector<Waypoint>& waypoints,
       }
       path.times_.push_back(time);
     }
-    constexpr double kLongest = 6 * 3600;  // s; the limits are checked every centisecond
-    if (!(path.times_.back() <= kLongest)) {
+    constexpr double kLongestFlight = 6 * 3600;  // s; the limits are checked every centisecond
+    if (!(path.times_.back() <= kLongestFlight)) {
       return Error{fmt::format("waypoints: found a flight of {:.6g} s, expected at most {} s",
-                               path.times_.back(), kLongest)};
+                               path.times_.back(), kLongestFlight)};
     }
     if (path.times_[0] != 0)
       return Error{fmt::format("waypoint 1: found time {} s, expected 0", path.times_[0])};
