@@ -169,6 +169,17 @@ TEST(DepthKernel, SumsOfFlowAndGradientsAreTheSameInEveryInstructionSet) {
     std::vector<float> n(kCount);
     PADE_DISPATCH(accumulate_flow_row, set)
     (row.flow.data(), row.gate.data(), kCount, u.data(), v.data(), n.data());
+    std::vector<float> mean(2 * kCount);
+    std::vector<std::uint8_t> empty(kCount);
+    PADE_DISPATCH(mean_flow, set)(u.data(), v.data(), n.data(), kCount, mean.data(), empty.data());
+    for (std::size_t i = 0; i < kCount; ++i) {
+      EXPECT_EQ(empty[i], n[i] > 0 ? 0 : 1);
+      if (n[i] > 0) {
+        EXPECT_EQ(mean[2 * i], u[i]);  // here each window is one pixel
+      } else {
+        EXPECT_TRUE(std::isnan(mean[2 * i]) && std::isnan(mean[2 * i + 1]));
+      }
+    }
     for (const int window : {2, 3, 4, 8, 11}) {
       std::vector<float> sums(kCount / static_cast<std::size_t>(window) + 1);
       PADE_DISPATCH(sum_columns, set)(n.data(), kCount, window, sums.data());

@@ -15,7 +15,7 @@ constexpr double kMedianToSigma = 1.4826;
 constexpr double kLeastFlowSigma = 0.01;   // px; no flow method is better, and thresholds need a scale
 constexpr double kUnknownFlowSigma = 0.5;  // px, where too few pixels are left to measure it
 constexpr std::size_t kFewestSamples = 50;
-constexpr double kNoiseSamples = 1500;  // pixels, on a grid, that measure the noise of the flow
+constexpr double kNoiseSamples = 1000;  // pixels, on a grid, that measure the noise of the flow
 constexpr double kFocusSamples = 4800;  // and that find the focus of expansion
 constexpr double kEpipoleCone =
     0.25;                             // tangent of the angle from the epipole beyond which it is not to blame
@@ -159,6 +159,7 @@ void average(const FlowField& flow, const cv::Mat& gate, int n, double sigma, st
   const auto width = static_cast<std::size_t>(flow.vectors.cols);
   const auto accumulate = PADE_DISPATCH(accumulate_flow_row, simd::best());
   const auto sum_columns = PADE_DISPATCH(sum_columns, simd::best());
+  const auto mean_flow = PADE_DISPATCH(mean_flow, simd::best());
   cells.vectors.create(size, CV_32FC2);
   cell_gate.create(size, CV_8UC1);
   sums.resize(6 * width);
@@ -179,12 +180,11 @@ void average(const FlowField& flow, const cv::Mat& gate, int n, double sigma, st
     sum_columns(sum_u, width, n, cell_u);
     sum_columns(sum_v, width, n, cell_v);
     sum_columns(valid, width, n, cell_valid);
-    auto* const vectors = cells.vectors.ptr<cv::Vec2f>(r);
     auto* const gates = cell_gate.ptr<std::uint8_t>(r);
+    mean_flow(cell_u, cell_v, cell_valid, static_cast<std::size_t>(size.width), cells.vectors.ptr<float>(r),
+              gates);
     for (int c = 0; c < size.width; ++c) {
-      const float m = cell_valid[c];
-      vectors[c] = {cell_u[c] / m, cell_v[c] / m};  // 0 / 0 is NaN: no flow
-      gates[c] = m > 0 ? 0 : weakest_reason(gate, cv::Rect(c * n, r * n, n, n));
+      if (gates[c] != 0) gates[c] = weakest_reason(gate, cv::Rect(c * n, r * n, n, n));
     }
     if (cells.sigma.empty()) continue;
     for (int c = 0; c < size.width; ++c) {

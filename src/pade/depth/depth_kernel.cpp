@@ -216,6 +216,16 @@ void sum_columns(const float* in, std::size_t width, int n, float* out) {
   if (rest < width) sum_whole_windows<0>(in + rest, 1, static_cast<int>(width - rest), out + whole);
 }
 
+void mean_flow(const float* __restrict sum_u, const float* __restrict sum_v, const float* __restrict valid,
+               std::size_t count, float* __restrict mean, std::uint8_t* __restrict empty) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float share = 1.0F / valid[i];
+    mean[2 * i] = sum_u[i] * share;  // 0 * (1 / 0) is NaN: no flow
+    mean[2 * i + 1] = sum_v[i] * share;
+    empty[i] = valid[i] > 0.0F ? 0 : 1;
+  }
+}
+
 void accumulate_gradients(const std::int16_t* __restrict gx, const std::int16_t* __restrict gy,
                           std::size_t count, std::int32_t* __restrict xx, std::int32_t* __restrict xy,
                           std::int32_t* __restrict yy) {

@@ -57,6 +57,11 @@ PADE_DECLARE_KERNEL(void accumulate_flow_row(const float* flow, const std::uint8
 /// Sums each n neighbours of a row: out[c] = in[c n] + ... + in[c n + n - 1], the last one of what is left.
 PADE_DECLARE_KERNEL(void sum_columns(const float* in, std::size_t width, int n, float* out))
 
+/// Mean flow of each window from its sums: interleaved (u, v), and 0 in `empty` where there is one; NaN and 1
+/// where no pixel was valid.
+PADE_DECLARE_KERNEL(void mean_flow(const float* sum_u, const float* sum_v, const float* valid,
+                                   std::size_t count, float* mean, std::uint8_t* empty))
+
 /// Adds the products of one row of image gradients to the columns of a structure tensor.
 PADE_DECLARE_KERNEL(void accumulate_gradients(const std::int16_t* gx, const std::int16_t* gy,
                                               std::size_t count, std::int32_t* xx, std::int32_t* xy,
