@@ -1,7 +1,5 @@
 #include "pade/flow/epipolar.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <memory>
 #include <string>
@@ -10,51 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "flow/flow_scene.hpp"
+#include "flow/forward_flight.hpp"
 
 namespace pade::flow {
 namespace {
-
-// A camera that flies along its optical axis toward a slanted plane, the focus of expansion inside the image.
-struct ForwardFlight {
-  static constexpr double kFocal = 250, kX = 165, kY = 117, kStep = 0.4, kDistance = 8;
-  cv::Mat first, second, truth;
-  EpipolarField lines;
-
-  ForwardFlight() : truth(240, 320, CV_32FC2) {
-    const cv::Size size = truth.size();
-    lines.direction.create(size, CV_32FC2);
-    const auto slant = [](double x, double y) {
-      return 0.15 * (x - kX) / kFocal + 0.6 * (y - kY) / kFocal + 1;
-    };
-    const testing::Waves waves(7);
-    first = testing::render(size, waves);
-    second = testing::render(size, waves, [&](double x, double y) {
-      const double z = (kDistance - kStep) / slant(x, y);
-      return cv::Point2d(kX, kY) + (cv::Point2d(x, y) - cv::Point2d(kX, kY)) * (z / (z + kStep));
-    });
-    for (int y = 0; y < size.height; ++y) {
-      for (int x = 0; x < size.width; ++x) {
-        const double z = kDistance / slant(x, y);
-        const cv::Point2d from(x - kX, y - kY);
-        const double radius = std::max(cv::norm(from), 1e-9);
-        truth.at<cv::Vec2f>(y, x) = cv::Vec2d(from.x, from.y) * (kStep / (z - kStep));
-        lines.direction.at<cv::Vec2f>(y, x) = cv::Vec2d(from.x, from.y) * (1 / radius);
-      }
-    }
-  }
-};
-
-double median_error(const cv::Mat& vectors, const cv::Mat& truth) {
-  std::vector<double> errors;
-  for (int y = 8; y < truth.rows - 8; ++y) {
-    for (int x = 8; x < truth.cols - 8; ++x) {
-      errors.push_back(cv::norm(vectors.at<cv::Vec2f>(y, x) - truth.at<cv::Vec2f>(y, x)));
-    }
-  }
-  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
-                   errors.end());
-  return errors[errors.size() / 2];
-}
 
 class EpipolarMethods : public ::testing::TestWithParam<std::string> {
  protected:
@@ -64,32 +21,28 @@ class EpipolarMethods : public ::testing::TestWithParam<std::string> {
       options.pyramid.confidence = confidence;
       return make_epipolar_lucas_kanade(options);
     }
-    ClgOptions options = clg_fast_options();
+    ClgOptions options = epipolar_clg_options();
     options.pyramid.confidence = confidence;
     return make_epipolar_clg(options);
   }
 };
 
 TEST_P(EpipolarMethods, KnowingTheLinesHalvesTheErrorOfForwardFlight) {
-  const ForwardFlight flight;
+  const testing::ForwardFlight flight;
+  const testing::ForwardFlight noisy(1, 4);
   const cv::Mat noise_free = make()->estimate(flight.first, flight.second, flight.lines).flow.vectors;
   const auto general = make_flow_estimator(GetParam());
   ASSERT_TRUE(general.ok());
-  cv::Mat first = flight.first.clone();
-  cv::Mat second = flight.second.clone();
-  for (cv::Mat* image : {&first, &second}) {
-    cv::Mat noise(image->size(), CV_8SC1);
-    cv::randn(noise, 0, 4);
-    cv::add(*image, noise, *image, cv::noArray(), CV_8U);
-  }
-  const double aided = median_error(make()->estimate(first, second, flight.lines).flow.vectors, flight.truth);
-  const double free = median_error((*general)->estimate(first, second).vectors, flight.truth);
+  const double aided = testing::median_error(
+      make()->estimate(noisy.first, noisy.second, flight.lines).flow.vectors, flight.truth);
+  const double free =
+      testing::median_error((*general)->estimate(noisy.first, noisy.second).vectors, flight.truth);
   EXPECT_LT(aided, 0.65 * free);
-  EXPECT_LT(median_error(noise_free, flight.truth), 0.06);
+  EXPECT_LT(testing::median_error(noise_free, flight.truth), 0.06);
 }
 
 TEST_P(EpipolarMethods, ResultsLieOnTheLine) {
-  const ForwardFlight flight;
+  const testing::ForwardFlight flight;
   EpipolarField lines = flight.lines;
   lines.base = cv::Mat(flight.first.size(), CV_32FC2, cv::Scalar(0.5, -0.25));
   const EpipolarFlow flow = make()->estimate(flight.first, flight.second, lines);
@@ -113,7 +66,7 @@ TEST_P(EpipolarMethods, TheBaseFlowTakesTheRotationAway) {
   lines.base = cv::Mat(size, CV_32FC2, cv::Scalar(12, -9));
   lines.direction = cv::Mat(size, CV_32FC2, cv::Scalar(1, 0));
   const EpipolarFlow flow = make()->estimate(first, second, lines);
-  EXPECT_LT(median_error(flow.flow.vectors, cv::Mat(size, CV_32FC2, cv::Scalar(14.5, -9))), 0.06);
+  EXPECT_LT(testing::median_error(flow.flow.vectors, cv::Mat(size, CV_32FC2, cv::Scalar(14.5, -9))), 0.06);
 }
 
 TEST_P(EpipolarMethods, StartFromThePredictedDistance) {
@@ -127,7 +80,8 @@ TEST_P(EpipolarMethods, StartFromThePredictedDistance) {
   const cv::Mat predicted(size, CV_32FC1, cv::Scalar(74));
   const EpipolarFlow flow = make()->estimate(first, second, lines, predicted);
   const cv::Rect seen(10, 10, 90, 140);
-  EXPECT_LT(median_error(flow.flow.vectors(seen), cv::Mat(seen.size(), CV_32FC2, cv::Scalar(75, 0))), 0.1);
+  EXPECT_LT(testing::median_error(flow.flow.vectors(seen), cv::Mat(seen.size(), CV_32FC2, cv::Scalar(75, 0))),
+            0.1);
 }
 
 TEST_P(EpipolarMethods, WhatMovesAcrossTheLineIsSeen) {

@@ -22,11 +22,15 @@ constexpr double kAcrossSigma = 2.5;
 constexpr float kAcrossDamping = 1.0F;
 constexpr float kGreyNoise = 1.0F;
 
+// The lines of one pyramid level.
 struct LinePlanes {
-  Plane base_u, base_v, direction_x, direction_y, u, v;
+  Plane base_u, base_v, direction_x, direction_y;
 
+  void resize(int width, int height) {
+    for (Plane* plane : {&base_u, &base_v, &direction_x, &direction_y}) plane->resize(width, height);
+  }
   [[nodiscard]] EpipolarLevel view() const {
-    return {base_u.view(), base_v.view(), direction_x.view(), direction_y.view(), u.view(), v.view()};
+    return {base_u.view(), base_v.view(), direction_x.view(), direction_y.view()};
   }
 };
 
@@ -55,8 +59,8 @@ class EpipolarPyramid : public EpipolarEstimator {
     scratch_.resize(static_cast<std::size_t>(
         std::max({planes, scratch_floats(first.cols),
                   PADE_DISPATCH(confidence_scratch, isa_)(kAcrossRadius, first.cols)})));
+    load_lines(lines);
     for (int level = count - 1; level >= 0; --level) {
-      load_lines(lines, level);
       start(level, count, initial);
       refine(level);
     }
@@ -78,33 +82,37 @@ class EpipolarPyramid : public EpipolarEstimator {
   FlowOptions options_;
   simd::InstructionSet isa_ = simd::best();
   Pyramid first_, second_;
-  LinePlanes line_;
+  std::vector<LinePlanes> lines_;  // by level
   Plane distance_, spare_;
   std::vector<float> scratch_;
 
  private:
-  // The line of a coarse pixel is that of the fine pixel on which it lies.
-  void load_lines(const EpipolarField& lines, int level) {
-    const Plane& size = first_.levels[static_cast<std::size_t>(level)];
-    for (Plane* plane :
-         {&line_.base_u, &line_.base_v, &line_.direction_x, &line_.direction_y, &line_.u, &line_.v}) {
-      plane->resize(size.width(), size.height());
+  void load_lines(const EpipolarField& field) {
+    lines_.resize(first_.levels.size());
+    LinePlanes& finest = lines_[0];
+    finest.resize(first_.levels[0].width(), first_.levels[0].height());
+    auto* split = PADE_DISPATCH(split_components, isa_);
+    for (int y = 0; y < field.direction.rows; ++y) {
+      split(field.direction.ptr<float>(y), finest.direction_x.row(y), finest.direction_y.row(y),
+            field.direction.cols);
+      if (field.base.empty()) continue;
+      split(field.base.ptr<float>(y), finest.base_u.row(y), finest.base_v.row(y), field.base.cols);
     }
-    const float factor = 1.0F / static_cast<float>(1 << level);
-    for (int y = 0; y < size.height(); ++y) {
-      const int fine_y = std::min(y << level, lines.direction.rows - 1);
-      const auto* direction = lines.direction.ptr<cv::Vec2f>(fine_y);
-      const auto* base = lines.base.empty() ? nullptr : lines.base.ptr<cv::Vec2f>(fine_y);
-      for (int x = 0; x < size.width(); ++x) {
-        const int fine_x = std::min(x << level, lines.direction.cols - 1);
-        const cv::Vec2f e = direction[fine_x];
-        const bool defined = std::isfinite(e[0]) && std::isfinite(e[1]);
-        line_.direction_x.row(y)[x] = defined ? e[0] : 0;
-        line_.direction_y.row(y)[x] = defined ? e[1] : 0;
-        const cv::Vec2f b = base != nullptr ? base[fine_x] : cv::Vec2f(0, 0);
-        line_.base_u.row(y)[x] = std::isfinite(b[0]) ? b[0] * factor : 0;
-        line_.base_v.row(y)[x] = std::isfinite(b[1]) ? b[1] * factor : 0;
-      }
+    if (field.base.empty()) {
+      finest.base_u.fill(0);
+      finest.base_v.fill(0);
+    }
+    // The line of a coarse pixel is that of the fine pixel on which it lies.
+    auto* coarser = PADE_DISPATCH(every_other, isa_);
+    for (std::size_t level = 1; level < lines_.size(); ++level) {
+      const LinePlanes& from = lines_[level - 1];
+      LinePlanes& to = lines_[level];
+      const int height = first_.levels[level].height();
+      to.resize(first_.levels[level].width(), height);
+      coarser(from.direction_x.view(), to.direction_x.view(), 1, 0, height);
+      coarser(from.direction_y.view(), to.direction_y.view(), 1, 0, height);
+      coarser(from.base_u.view(), to.base_u.view(), 0.5F, 0, height);
+      coarser(from.base_v.view(), to.base_v.view(), 0.5F, 0, height);
     }
   }
 
@@ -132,20 +140,16 @@ class EpipolarPyramid : public EpipolarEstimator {
 
   EpipolarFlow result() {
     const int height = distance_.height();
-    const EpipolarLevel line = line_.view();
-    PADE_DISPATCH(epipolar_flow, isa_)(line, distance_.view(), 0, height);
+    flow_.resize(distance_.width(), height);
+    PADE_DISPATCH(epipolar_flow, isa_)
+    (lines_[0].view(), distance_.view(), flow_.u.view(), flow_.v.view(), 0, height);
     EpipolarFlow out;
-    FlowPlanes flow;
-    std::swap(flow.u, line_.u);
-    std::swap(flow.v, line_.v);
-    out.flow.vectors = to_vectors(flow);
+    out.flow.vectors = to_vectors(flow_);
     out.distance = to_mat(distance_);
     if (options_.confidence != FlowConfidence::none) {
-      out.flow.sigma = sigma(flow);
-      out.across = across(flow);
+      out.flow.sigma = sigma();
+      out.across = across();
     }
-    std::swap(flow.u, line_.u);
-    std::swap(flow.v, line_.v);
     return out;
   }
 
@@ -155,12 +159,12 @@ class EpipolarPyramid : public EpipolarEstimator {
     return values;
   }
 
-  cv::Mat sigma(const FlowPlanes& flow) {
+  cv::Mat sigma() {
     ConfidenceInput input;
     input.first = first_.levels[0].view();
     input.second = second_.levels[0].view();
-    input.u = flow.u.view();
-    input.v = flow.v.view();
+    input.u = flow_.u.view();
+    input.v = flow_.v.view();
     spare_.resize(distance_.width(), distance_.height());
     input.sigma = spare_.view();
     input.taps = across_taps_.data();
@@ -172,15 +176,15 @@ class EpipolarPyramid : public EpipolarEstimator {
   }
 
   // One Lucas-Kanade step at right angles to the line, from the solution.
-  cv::Mat across(const FlowPlanes& flow) {
+  cv::Mat across() {
     const int width = distance_.width();
     const int height = distance_.height();
     Plane normal_x(width, height);
     Plane normal_y(width, height);
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
-        normal_x.row(y)[x] = -line_.direction_y.row(y)[x];
-        normal_y.row(y)[x] = line_.direction_x.row(y)[x];
+        normal_x.row(y)[x] = -lines_[0].direction_y.row(y)[x];
+        normal_y.row(y)[x] = lines_[0].direction_x.row(y)[x];
       }
     }
     Plane slope(width, height);
@@ -188,7 +192,7 @@ class EpipolarPyramid : public EpipolarEstimator {
     Plane zero(width, height);
     spare_.resize(width, height);
     EpipolarLucasKanade level;
-    level.line = {flow.u.view(), flow.v.view(), normal_x.view(), normal_y.view(), {}, {}};
+    level.line = {flow_.u.view(), flow_.v.view(), normal_x.view(), normal_y.view()};
     level.first = first_.levels[0].view();
     level.second = second_.levels[0].view();
     level.slope = slope.view();
@@ -205,6 +209,7 @@ class EpipolarPyramid : public EpipolarEstimator {
     return cv::abs(to_mat(spare_));
   }
 
+  FlowPlanes flow_;
   std::vector<float> across_taps_;
 };
 
@@ -229,7 +234,7 @@ class EpipolarLk final : public EpipolarPyramid {
     slope_.resize(level.first.width, height);
     inverse_.resize(level.first.width, height);
     spare_.resize(level.first.width, height);
-    level.line = line_.view();
+    level.line = lines_[at].view();
     level.slope = slope_.view();
     level.inverse = inverse_.view();
     level.taps = taps_.data();
@@ -294,18 +299,11 @@ class EpipolarClgFlow final : public EpipolarPyramid {
     m.resize(distance_.width(), height);
     for (int warp = 0; warp < (index == 0 ? clg_.warps : clg_.coarse_warps); ++warp) {
       EpipolarClg level = view(m);
-      for (int y = 0; y < height; ++y) std::copy_n(distance_.row(y), distance_.stride(), m.distance0.row(y));
-      PADE_DISPATCH(epipolar_flow, isa_)(level.line, distance_.view(), 0, height);
-      ClgLevel images;
-      images.first = first_.levels[at].view();
-      images.second = second_.levels[at].view();
-      images.u0 = line_.u.view();
-      images.v0 = line_.v.view();
-      images.mean = level.mean;
-      images.difference = level.difference;
-      PADE_DISPATCH(clg_warp, isa_)(images, 0, height);
+      level.line = lines_[at].view();
+      level.first = first_.levels[at].view();
+      level.second = second_.levels[at].view();
+      PADE_DISPATCH(epipolar_clg_warp, isa_)(level, 0, height);
       PADE_DISPATCH(epipolar_clg_tensor, isa_)(level, 0, height, scratch_.data());
-      PADE_DISPATCH(clg_split, isa_)(level.distance, level.split_distance, 0, height);
       for (int i = 0; i < clg_.lagged; ++i) {
         PADE_DISPATCH(epipolar_clg_system, isa_)(level, 0, height, scratch_.data());
         PADE_DISPATCH(epipolar_clg_relax, isa_)(level, clg_.sweeps, static_cast<float>(clg_.omega));
@@ -318,7 +316,6 @@ class EpipolarClgFlow final : public EpipolarPyramid {
  private:
   [[nodiscard]] EpipolarClg view(const EpipolarClgMemory& m) const {
     EpipolarClg level;
-    level.line = line_.view();
     level.mean = m.mean.view();
     level.difference = m.difference.view();
     level.distance0 = m.distance0.view();
@@ -349,8 +346,15 @@ class EpipolarClgFlow final : public EpipolarPyramid {
 
 LucasKanadeOptions epipolar_lucas_kanade_options() {
   LucasKanadeOptions options;
-  options.iterations = 2;
+  options.iterations = 1;
   options.coarse_iterations = 4;
+  return options;
+}
+
+ClgOptions epipolar_clg_options() {
+  ClgOptions options = clg_fast_options();
+  options.coarse_warps = 4;
+  options.sweeps = 6;
   return options;
 }
 

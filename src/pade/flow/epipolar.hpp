@@ -54,13 +54,14 @@ class EpipolarEstimator {
   }
 };
 
-/// One unknown converges sooner than two: fewer iterations.
+/// One unknown converges sooner than two: fewer iterations, warps and sweeps.
 LucasKanadeOptions epipolar_lucas_kanade_options();
+ClgOptions epipolar_clg_options();
 
 /// The options are those of the general methods; `pyramid.threads` and `pyramid.half_resolution` have no
 /// effect here. With pyramid.confidence = none neither sigma nor `across` is computed.
 std::unique_ptr<EpipolarEstimator> make_epipolar_lucas_kanade(
     const LucasKanadeOptions& options = epipolar_lucas_kanade_options());
-std::unique_ptr<EpipolarEstimator> make_epipolar_clg(const ClgOptions& options = clg_fast_options());
+std::unique_ptr<EpipolarEstimator> make_epipolar_clg(const ClgOptions& options = epipolar_clg_options());
 
 }  // namespace pade::flow

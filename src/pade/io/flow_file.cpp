@@ -5,14 +5,13 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
-#include <system_error>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
+
+#include "pade/io/atomic_output.hpp"
 
 namespace pade::io {
 namespace {
@@ -28,28 +27,8 @@ constexpr std::size_t kHeaderBytes = 12;
 constexpr float kKittiScale = 64.0F;
 constexpr float kKittiOffset = 32768.0F;
 
-Result<std::vector<std::uint8_t>> read_bytes(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return Error{fmt::format("{}: cannot be opened for reading", file.string())};
-  std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (stream.bad()) return Error{fmt::format("{}: reading failed", file.string())};
-  return bytes;
-}
-
-Status write_bytes(const std::filesystem::path& file, const std::vector<std::uint8_t>& bytes) {
-  std::filesystem::path part = file;
-  part += ".part";
-  std::ofstream stream(part, std::ios::binary);
-  stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  stream.close();
-  std::error_code failure;
-  if (!stream) {
-    std::filesystem::remove(part, failure);
-    return Error{fmt::format("{}: cannot be written", file.string())};
-  }
-  std::filesystem::rename(part, file, failure);
-  if (failure) return Error{fmt::format("{}: {}", file.string(), failure.message())};
-  return {};
+std::span<const std::uint8_t> as_bytes(const std::string& content) {
+  return {reinterpret_cast<const std::uint8_t*>(content.data()), content.size()};
 }
 
 std::uint64_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
@@ -181,9 +160,10 @@ Result<cv::Mat> read_flow(const std::filesystem::path& file) {
   if (ending != ".flo" && ending != ".png") {
     return Error{fmt::format("{}: flow files end in .flo or .png", file.string())};
   }
-  const Result<std::vector<std::uint8_t>> bytes = read_bytes(file);
-  if (!bytes) return bytes.error();
-  return ending == ".flo" ? decode_flo(*bytes, file.string()) : decode_kitti_flow(*bytes, file.string());
+  const Result<std::string> content = read_file(file);
+  if (!content) return content.error();
+  const std::span<const std::uint8_t> bytes = as_bytes(*content);
+  return ending == ".flo" ? decode_flo(bytes, file.string()) : decode_kitti_flow(bytes, file.string());
 }
 
 Status write_flow(const std::filesystem::path& file, const cv::Mat& vectors) {
@@ -191,9 +171,11 @@ Status write_flow(const std::filesystem::path& file, const cv::Mat& vectors) {
     return Error{fmt::format("{}: the flow to write is empty or not of type CV_32FC2", file.string())};
   }
   const std::string ending = file.extension().string();
-  if (ending == ".flo") return write_bytes(file, encode_flo(vectors));
-  if (ending == ".png") return write_bytes(file, encode_kitti_flow(vectors));
-  return Error{fmt::format("{}: flow files end in .flo or .png", file.string())};
+  if (ending != ".flo" && ending != ".png") {
+    return Error{fmt::format("{}: flow files end in .flo or .png", file.string())};
+  }
+  const std::vector<std::uint8_t> bytes = ending == ".flo" ? encode_flo(vectors) : encode_kitti_flow(vectors);
+  return write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, Overwrite::replace);
 }
 
 }  // namespace pade::io

@@ -14,12 +14,61 @@
 
 namespace pade::flow::PADE_ISA {
 
-void epipolar_flow(const EpipolarLevel& line, PlaneView distance, int first, int last) {
+namespace {
+
+PADE_INLINE I finite(V a) {
+  constexpr int kExponent = 0x7f800000;
+  return (I(a) & kExponent) != kExponent;
+}
+
+// Where the line puts the pixels from (x, y) on at the distances d.
+struct Target {
+  V x, y;
+
+  [[gnu::always_inline]] Target(const EpipolarLevel& e, V d, int from_x, int from_y)
+      : x(load(e.base_u.row(from_y) + from_x) + d * load(e.direction_x.row(from_y) + from_x) +
+          (ramp() + static_cast<float>(from_x))),
+        y(load(e.base_v.row(from_y) + from_x) + d * load(e.direction_y.row(from_y) + from_x) +
+          static_cast<float>(from_y)) {}
+};
+
+}  // namespace
+
+void split_components(const float* from, float* x, float* y, int width) {
+  int i = 0;
+  for (; i + kLanes <= width; i += kLanes) {
+    const V a = load(from + 2L * i);
+    const V b = load(from + 2L * i + kLanes);
+    const V xs = even(a, b);
+    const V ys = odd(a, b);
+    const I known = finite(xs) & finite(ys);
+    store(x + i, select(known, xs, V{}));
+    store(y + i, select(known, ys, V{}));
+  }
+  for (; i < padded(width); ++i) {
+    const float* pair = from + 2L * (i < width ? i : width - 1);
+    const bool known = __builtin_isfinite(pair[0]) && __builtin_isfinite(pair[1]);
+    x[i] = known ? pair[0] : 0;
+    y[i] = known ? pair[1] : 0;
+  }
+}
+
+void every_other(PlaneView from, PlaneView to, float factor, int first, int last) {
+  for (int y = first; y < last; ++y) {
+    const float* row = from.row(2 * y);
+    float* out = to.row(y);
+    for (int x = 0; x < to.width; ++x) out[x] = row[2 * x] * factor;
+    for (int x = to.width; x < padded(to.width); ++x) out[x] = out[to.width - 1];
+  }
+}
+
+void epipolar_flow(const EpipolarLevel& line, PlaneView distance, PlaneView u, PlaneView v, int first,
+                   int last) {
   for (int y = first; y < last; ++y) {
     for (int x = 0; x < padded(distance.width); x += kLanes) {
       const V d = load(distance.row(y) + x);
-      store(line.u.row(y) + x, load(line.base_u.row(y) + x) + d * load(line.direction_x.row(y) + x));
-      store(line.v.row(y) + x, load(line.base_v.row(y) + x) + d * load(line.direction_y.row(y) + x));
+      store(u.row(y) + x, load(line.base_u.row(y) + x) + d * load(line.direction_x.row(y) + x));
+      store(v.row(y) + x, load(line.base_v.row(y) + x) + d * load(line.direction_y.row(y) + x));
     }
   }
 }
@@ -68,15 +117,12 @@ void epipolar_lk_iterate(const EpipolarLucasKanade& level, int first, int last, 
       [&](int y, float* const* out) {
         for (int x = 0; x < n; x += kLanes) {
           const V d = load(level.distance.row(y) + x);
-          const V at_x = load(e.base_u.row(y) + x) + d * load(e.direction_x.row(y) + x) +
-                         (ramp() + static_cast<float>(x));
-          const V at_y =
-              load(e.base_v.row(y) + x) + d * load(e.direction_y.row(y) + x) + static_cast<float>(y);
-          const V inside_x = clamp(at_x, 0, right);
-          const V inside_y = clamp(at_y, 0, bottom);
+          const Target at(e, d, x, y);
+          const V inside_x = clamp(at.x, 0, right);
+          const V inside_y = clamp(at.y, 0, bottom);
           const V difference = bilinear(level.second.data, level.second.stride, inside_x, inside_y) -
                                load(level.first.row(y) + x);
-          const V seen = select(I(at_x == inside_x) & I(at_y == inside_y), difference, V{});
+          const V seen = select(I(at.x == inside_x) & I(at.y == inside_y), difference, V{});
           const V a = load(level.slope.row(y) + x);
           store(out[0] + x, a * (a * d - seen));
         }
@@ -89,6 +135,33 @@ void epipolar_lk_iterate(const EpipolarLucasKanade& level, int first, int last, 
                      load(level.inverse.row(y) + x) * b, level.largest_step);
         }
       });
+}
+
+void epipolar_clg_warp(const EpipolarClg& level, int first, int last) {
+  const int width = level.first.width;
+  const auto right = static_cast<float>(width - 1);
+  const auto bottom = static_cast<float>(level.first.height - 1);
+  for (int y = first; y < last; ++y) {
+    const auto warp = [&](int x) {
+      const V d = load(level.distance.row(y) + x);
+      store(level.distance0.row(y) + x, d);
+      const Target at(level.line, d, x, y);
+      const V inside_x = clamp(at.x, 0, right);
+      const V inside_y = clamp(at.y, 0, bottom);
+      const V here = load(level.first.row(y) + x);
+      const V warped = bilinear(level.second.data, level.second.stride, inside_x, inside_y);
+      const I seen = I(at.x == inside_x) & I(at.y == inside_y);
+      store(level.mean.row(y) + x, select(seen, 0.5F * (here + warped), here));
+      store(level.difference.row(y) + x, select(seen, warped - here, V{}));
+      return select(I(ramp() + static_cast<float>(x) < static_cast<float>(width)), d, V{});
+    };
+    for (int x = 0; x < padded(width); x += 2 * kLanes) {
+      const V a = warp(x);
+      const V b = warp(x + kLanes);
+      store(level.split_distance.even(y) + x / 2, even(a, b));
+      store(level.split_distance.odd(y) + x / 2, odd(a, b));
+    }
+  }
 }
 
 void epipolar_clg_tensor(const EpipolarClg& level, int first, int last, float* scratch) {
@@ -122,9 +195,8 @@ void epipolar_clg_tensor(const EpipolarClg& level, int first, int last, float* s
           const V ay = gxy * ex + (load(below) - 2.0F * load(m) + load(above)) * ey;
           const V xt = 0.5F * (load(d + 1) - load(d - 1));
           const V yt = 0.5F * (load(difference[y + 1] + x) - load(difference[y - 1] + x));
-          const V at_x = load(e.u.row(y) + x) + (ramp() + static_cast<float>(x));
-          const V at_y = load(e.v.row(y) + x) + static_cast<float>(y);
-          const I seen = I(at_x >= 0.0F) & I(at_x <= right) & I(at_y >= 0.0F) & I(at_y <= bottom);
+          const Target at(e, load(level.distance0.row(y) + x), x, y);
+          const I seen = I(at.x >= 0.0F) & I(at.x <= right) & I(at.y >= 0.0F) & I(at.y <= bottom);
           store(out[0] + x, select(seen, a * a + level.gamma * (ax * ax + ay * ay), V{}));
           store(out[1] + x, select(seen, a * gt + level.gamma * (ax * xt + ay * yt), V{}));
           store(out[2] + x, select(seen, gt * gt + level.gamma * (xt * xt + yt * yt), V{}));
