@@ -79,8 +79,10 @@ void line_twins(Twins& twins, simd::InstructionSet set, Images& m, const Lines& 
   Plane half((kWidth + 1) / 2, (kHeight + 1) / 2);
   twins.compare(
       "every_other", half.view(),
-      [&](int a, int b) { PADE_DISPATCH(every_other, set)
-                          (d, half.view(), 0.5F, a, b); },
+      [&](int a, int b) {
+        PADE_DISPATCH(every_other, set)
+        (d, half.view(), 0.5F, a, b);
+      },
       [&](int x, int y) { return 0.5 * at(d, 2 * x, 2 * y); });
 }
 
@@ -106,17 +108,24 @@ void lucas_kanade_line_twins(Twins& twins, simd::InstructionSet set, Images& m, 
   };
   twins.compare(
       "epipolar_lk_slope", level.slope,
-      [&](int from, int to) { PADE_DISPATCH(epipolar_lk_slope, set)
-                              (level, from, to, m.scratch.data()); }, a);
+      [&](int from, int to) {
+        PADE_DISPATCH(epipolar_lk_slope, set)
+        (level, from, to, m.scratch.data());
+      },
+      a);
   twins.compare(
       "epipolar_lk_prepare", level.inverse,
-      [&](int from, int to) { PADE_DISPATCH(epipolar_lk_prepare, set)
-                              (level, from, to, m.scratch.data()); },
+      [&](int from, int to) {
+        PADE_DISPATCH(epipolar_lk_prepare, set)
+        (level, from, to, m.scratch.data());
+      },
       [&](int x, int y) { return 1 / weight(x, y); });
   twins.compare(
       "epipolar_lk_iterate", level.next_distance,
-      [&](int from, int to) { PADE_DISPATCH(epipolar_lk_iterate, set)
-                              (level, from, to, m.scratch.data()); },
+      [&](int from, int to) {
+        PADE_DISPATCH(epipolar_lk_iterate, set)
+        (level, from, to, m.scratch.data());
+      },
       [&](int x, int y) {
         const double side = window(
             [&](int i, int j) {
