@@ -12,6 +12,8 @@
 #include "pade/evaluation/accuracy_tables.hpp"
 #include "pade/evaluation/run_evaluation.hpp"
 #include "pade/io/atomic_output.hpp"
+#include "pade/io/options_json.hpp"
+#include "pade/io/sequence.hpp"
 
 #include "commands.hpp"
 
@@ -29,6 +31,19 @@ struct Arguments {
   bool force = false;
 };
 
+// The sequence as the run read it: calibration, mask and poses decide which frames there are and on which
+// grid.
+Result<io::Sequence> open_as_the_run_did(const std::filesystem::path& folder, const io::Run& run) {
+  io::SequenceOptions options;
+  const Json stored = Json::parse(run.info.options, nullptr, false);
+  if (stored.is_object() && stored.contains("sequence")) {
+    const Status status =
+        io::from_yaml(stored["sequence"].dump(), (run.folder / "run.json").string(), options);
+    if (!status) return status.error();
+  }
+  return io::Sequence::open(folder, options);
+}
+
 // From the depth images and the truth where both are there, else what the run wrote down.
 Result<DepthAccuracy> accuracy_of(const std::string& folder, const Arguments& arguments) {
   const Result<io::Run> run = io::read_run(folder);
@@ -36,7 +51,7 @@ Result<DepthAccuracy> accuracy_of(const std::string& folder, const Arguments& ar
   const bool asked = !arguments.sequence.empty();
   const std::filesystem::path source = asked ? std::filesystem::path(arguments.sequence) : run->info.sequence;
   if (asked || (!run->depth_times.empty() && std::filesystem::exists(source))) {
-    const Result<io::Sequence> sequence = io::Sequence::open(source);
+    const Result<io::Sequence> sequence = open_as_the_run_did(source, *run);
     if (!sequence && asked) return sequence.error();
     if (sequence && (asked || sequence->has_truth())) return evaluation::evaluate_stack(*run, *sequence);
   }

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <numbers>
 #include <string>
@@ -10,12 +9,12 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <octomap/OcTree.h>
 
 #include "pade/evaluation/accuracy_tables.hpp"
 #include "pade/evaluation/run_evaluation.hpp"
 #include "pade/evaluation/sequence_check.hpp"
 #include "pade/io/atomic_output.hpp"
+#include "pade/io/map_files.hpp"
 #include "pade/io/run_reader.hpp"
 #include "pade/io/sequence.hpp"
 
@@ -193,80 +192,34 @@ Status inform_of_sequence(const Arguments& arguments) {
   return {};
 }
 
-// Both of OctoMap's formats. Its readers build what they can of a damaged file, so the stream is asked
-// afterwards.
-Result<std::unique_ptr<octomap::OcTree>> read_tree(const std::string& path) {
-  const auto refuse = [&path](std::string_view found) {
-    return Error{fmt::format("{}: found {}, expected an OctoMap octree (.bt or .ot)", path, found)};
-  };
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return refuse("a file that cannot be opened");
-  std::string header;
-  std::getline(file, header);
-  file.seekg(0);
-  std::unique_ptr<octomap::OcTree> tree;
-  if (header.starts_with("# Octomap OcTree binary file")) {
-    tree = std::make_unique<octomap::OcTree>(1.0);
-    if (!tree->readBinary(file)) return refuse("a damaged .bt file");
-  } else if (header.starts_with("# Octomap OcTree file")) {
-    std::unique_ptr<octomap::AbstractOcTree> any(octomap::AbstractOcTree::read(file));
-    if (dynamic_cast<octomap::OcTree*>(any.get()) == nullptr)
-      return refuse("a damaged or another kind of .ot file");
-    tree.reset(dynamic_cast<octomap::OcTree*>(any.release()));
-  } else {
-    return refuse("another beginning");
-  }
-  if (file.fail()) return refuse("a file that was cut short");
-  return tree;
-}
-
-struct MapContent {
-  double occupied = 0, free = 0;  // m3
-  std::uint64_t occupied_voxels = 0, free_voxels = 0;
-  Eigen::AlignedBox3d bounds;
-};
-
-MapContent content_of(const octomap::OcTree& tree) {
-  MapContent content;
-  const double voxel = tree.getResolution();
-  for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
-    // A leaf above the lowest level stands for all the voxels in it.
-    const auto voxels = std::uint64_t{1} << 3 * (tree.getTreeDepth() - leaf.getDepth());
-    (tree.isNodeOccupied(*leaf) ? content.occupied_voxels : content.free_voxels) += voxels;
-    const Eigen::Vector3d centre(leaf.getX(), leaf.getY(), leaf.getZ());
-    const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * leaf.getSize());
-    content.bounds.extend(Eigen::AlignedBox3d(centre - half, centre + half));
-  }
-  content.occupied = static_cast<double>(content.occupied_voxels) * voxel * voxel * voxel;
-  content.free = static_cast<double>(content.free_voxels) * voxel * voxel * voxel;
-  return content;
-}
-
 Status inform_of_map(const Arguments& arguments) {
-  const Result<std::unique_ptr<octomap::OcTree>> tree = read_tree(arguments.path);
-  if (!tree) return tree.error();
-  const octomap::OcTree& map = **tree;
-  const MapContent content = content_of(map);
-  const Eigen::AlignedBox3d& bounds = content.bounds;
+  const Result<mapping::OccupancyMap> map = io::read_map(arguments.path);
+  if (!map) return map.error();
+  const double voxel = map->options().voxel;
+  const double cube = voxel * voxel * voxel;
+  const mapping::OccupancyMap::Counts counts = map->counts();
+  const double occupied = static_cast<double>(counts.occupied) * cube;
+  const double free = static_cast<double>(counts.free) * cube;
+  const Eigen::AlignedBox3d bounds = map->bounds();
   if (arguments.json) {
     Json json = {{"kind", "map"},
                  {"file", arguments.path},
-                 {"voxel_m", map.getResolution()},
-                 {"nodes", map.size()},
-                 {"occupied_voxels", content.occupied_voxels},
-                 {"free_voxels", content.free_voxels},
-                 {"occupied_m3", content.occupied},
-                 {"free_m3", content.free},
+                 {"voxel_m", voxel},
+                 {"nodes", map->tree().size()},
+                 {"occupied_voxels", counts.occupied},
+                 {"free_voxels", counts.free},
+                 {"occupied_m3", occupied},
+                 {"free_m3", free},
                  {"bounds_m", nullptr}};
     if (!bounds.isEmpty())
       json["bounds_m"] = {{"from", json_of(bounds.min())}, {"to", json_of(bounds.max())}};
     fmt::print("{}\n", json.dump(2));
     return {};
   }
-  fmt::print("{}: occupancy map with voxels of {:g} m\n", arguments.path, map.getResolution());
-  line("nodes", "{}", map.size());
-  line("occupied", "{} voxels, {:.3f} m3", content.occupied_voxels, content.occupied);
-  line("free", "{} voxels, {:.3f} m3", content.free_voxels, content.free);
+  fmt::print("{}: occupancy map with voxels of {:g} m\n", arguments.path, voxel);
+  line("nodes", "{}", map->tree().size());
+  line("occupied", "{} voxels, {:.3f} m3", counts.occupied, occupied);
+  line("free", "{} voxels, {:.3f} m3", counts.free, free);
   if (!bounds.isEmpty()) line("bounds", "{} to {} m", vector_text(bounds.min()), vector_text(bounds.max()));
   return {};
 }
@@ -288,9 +241,7 @@ void print_run(const io::Run& run, const std::optional<evaluation::DepthAccuracy
   line("frames", "{} of {} used, {} depth images of {} x {}, poses {}", info.health.frames_used,
        info.health.frames, info.health.depth_images, info.camera.width, info.camera.height, info.poses);
   line("options", "{}", info.options);
-  if (info.world_up)
-    line("up", "{} ({})", direction_text(info.world_up->direction),
-         info.world_up->stated ? "stated" : "guessed");
+  if (info.world_up) line("up", "{} ({})", direction_text(info.world_up->direction), info.world_up->source);
   if (info.origin)
     line("origin", "latitude {:.7f}, longitude {:.7f}, height {:.2f} m", info.origin->latitude_deg,
          info.origin->longitude_deg, info.origin->height);

@@ -11,6 +11,7 @@
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
+#include "pade/io/text.hpp"
 #include "pade/pipeline/map_sequence.hpp"
 
 #include "commands.hpp"

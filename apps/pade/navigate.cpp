@@ -50,7 +50,7 @@ Result<NavigationRunOptions> run_options(const Arguments& arguments, const Navig
     options.heading->time.nanoseconds += 1'000'000'000;  // within the levelling at the start
   }
   if (!arguments.frames.empty()) {
-    const auto text = io::read_text(arguments.frames);
+    const auto text = io::read_file(arguments.frames);
     if (!text) return text.error();
     auto stamps = io::parse_stamps(*text, arguments.frames);
     if (!stamps) return stamps.error();

@@ -13,6 +13,7 @@
 #include "pade/io/run_images.hpp"
 #include "pade/io/run_reader.hpp"
 #include "pade/io/run_writer.hpp"
+#include "pade/io/text.hpp"
 
 #include "support/temporary_folder.hpp"
 
@@ -58,7 +59,7 @@ RunInfo some_info(cv::Size size) {
   info.camera.fx = info.camera.fy = 21.5;
   info.window = 2;
   info.health = {5, 4, 3, {{"rgb/3.png", "found 0 bytes"}}, {"world_up is a guess"}};
-  info.world_up = WorldUp{{0, -1, 0}, true};
+  info.world_up = WorldUp{{0, -1, 0}, true, "camera.yaml"};
   info.origin = GeographicOrigin{48.1, 11.6, 519.0};
   info.map = MapSummary{0.1, 123, 4567};
   return info;
@@ -161,6 +162,7 @@ TEST(RunFolderFiles, SayWhatTheRunSaysAboutItself) {
   ASSERT_TRUE(info.world_up.has_value());
   EXPECT_EQ(info.world_up->direction, Eigen::Vector3d(0, -1, 0));
   EXPECT_TRUE(info.world_up->stated);
+  EXPECT_EQ(info.world_up->source, expected.world_up->source);
   ASSERT_TRUE(info.origin.has_value());
   EXPECT_EQ(info.origin->latitude_deg, 48.1);
   ASSERT_TRUE(info.map.has_value());

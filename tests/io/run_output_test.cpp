@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "pade/io/atomic_output.hpp"
+#include "pade/io/text.hpp"
 
 #include "support/temporary_folder.hpp"
 

@@ -13,7 +13,7 @@ namespace pade::evaluation {
 Result<std::optional<DepthAccuracy>> stored_accuracy(const io::Run& run) {
   if (!run.has("evaluation.json")) return std::optional<DepthAccuracy>();
   const std::filesystem::path file = run.folder / "evaluation.json";
-  const Result<std::string> text = io::read_text(file);
+  const Result<std::string> text = io::read_file(file);
   if (!text) return text.error();
   Result<DepthAccuracy> accuracy = accuracy_from_json(*text, file.string());
   if (!accuracy) return accuracy.error();

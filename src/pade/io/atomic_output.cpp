@@ -228,23 +228,4 @@ Status write_file(const fs::path& path, std::string_view content, Overwrite over
   return written;
 }
 
-Result<std::string> read_file(const fs::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return os_error(path, "cannot be opened", errno);
-  std::string content;
-  char buffer[65536];
-  ssize_t count = 0;
-  while ((count = ::read(file, buffer, sizeof buffer)) != 0) {
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) {
-      const int reason = errno;
-      ::close(file);
-      return os_error(path, "cannot be read", reason);
-    }
-    content.append(buffer, static_cast<std::size_t>(count));
-  }
-  ::close(file);
-  return content;
-}
-
 }  // namespace pade::io

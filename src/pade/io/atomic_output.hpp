@@ -68,7 +68,4 @@ class OutputFolder {
 /// written to directly.
 Status write_file(const std::filesystem::path& path, std::string_view content, Overwrite overwrite);
 
-/// The content of a file.
-Result<std::string> read_file(const std::filesystem::path& path);
-
 }  // namespace pade::io

@@ -318,7 +318,7 @@ Result<Calibration> parse_calibration(std::string_view text, const std::string& 
 }
 
 Result<Calibration> read_calibration(const std::filesystem::path& file) {
-  const auto text = read_text(file);
+  const auto text = read_file(file);
   if (!text) return text.error();
   return parse_calibration(*text, file.string());
 }

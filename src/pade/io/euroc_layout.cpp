@@ -29,7 +29,7 @@ std::optional<Time> parse_nanoseconds(std::string_view text) {
 
 /// T_body_sensor of a sensor.yaml that describes no camera.
 Result<Pose> read_mounting(const fs::path& file) {
-  const auto text = read_text(file);
+  const auto text = read_file(file);
   if (!text) return text.error();
   const auto root = parse_yaml(*text, file.string());
   if (!root) return root.error();
@@ -41,7 +41,7 @@ Result<Pose> read_mounting(const fs::path& file) {
 }
 
 Result<Trajectory> read_euroc_poses(const fs::path& file, ReadReport& report) {
-  const auto text = read_text(file);
+  const auto text = read_file(file);
   if (!text) return text.error();
   return parse_euroc_poses(*text, file.string(), report);
 }
@@ -137,7 +137,7 @@ Result<SequenceListing> read_euroc_layout(const fs::path& folder, const LayoutCh
   if (!calibration) return calibration.error();
   listing.calibration = std::move(*calibration);
 
-  const auto text = read_text(camera / "data.csv");
+  const auto text = read_file(camera / "data.csv");
   if (!text) return text.error();
   listing.images = parse_euroc_images(*text, camera / "data.csv", report);
 

@@ -12,6 +12,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "pade/io/atomic_output.hpp"
+#include "pade/io/text.hpp"
 
 namespace pade::io {
 namespace {

@@ -31,7 +31,7 @@ std::optional<std::vector<double>> finite_numbers(const std::vector<std::string_
 
 /// One time per row; empty for a row that is no time, so that row numbers stay those of the images.
 Result<std::vector<std::optional<Time>>> read_times(const fs::path& file, ReadReport& report) {
-  const auto text = read_text(file);
+  const auto text = read_file(file);
   if (!text) return text.error();
   std::vector<std::optional<Time>> times;
   for (const Line& line : data_lines(*text)) {
@@ -73,7 +73,7 @@ fs::path own_pose_file(const fs::path& folder) {
 
 Result<Trajectory> read_poses(const fs::path& file, const std::vector<std::optional<Time>>& times,
                               ReadReport& report) {
-  const auto text = read_text(file);
+  const auto text = read_file(file);
   if (!text) return text.error();
   const auto lines = data_lines(*text);
   if (!lines.empty() && split_fields(lines.front().text).size() == 8) {
@@ -148,7 +148,7 @@ Result<SequenceListing> read_kitti_layout(const fs::path& folder, const LayoutCh
        {3, 1, 2, 0}) {  // the last that is there is preferred: grey left, then colour left
     if (path_exists(folder / fmt::format("image_{}", candidate))) camera = candidate;
   }
-  const auto text = read_text(folder / "calib.txt");
+  const auto text = read_file(folder / "calib.txt");
   if (!text) return text.error();
   auto own = parse_kitti_calibration(*text, (folder / "calib.txt").string(), camera);
   if (!own) return own.error();

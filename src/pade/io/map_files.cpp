@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pade/io/options_json.hpp"
+#include "pade/io/text.hpp"
 
 namespace pade::io {
 namespace {

@@ -48,7 +48,7 @@ auto read_optional(const std::filesystem::path& path, Parse parse, std::vector<s
   if (path.empty() || !std::filesystem::exists(path)) {
     return typename std::remove_cvref_t<decltype(*parse(std::string_view(), std::string_view(), remarks))>{};
   }
-  const auto text = read_text(path);
+  const auto text = read_file(path);
   if (!text) return text.error();
   return parse(*text, path.string(), remarks);
 }
@@ -71,7 +71,7 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   if (imu.empty())
     return Error{
         fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv", folder.string())};
-  const auto imu_text = read_text(imu);
+  const auto imu_text = read_file(imu);
   if (!imu_text) return imu_text.error();
   auto samples = parse_imu(*imu_text, imu.string(), log.remarks);
   if (!samples) return samples.error();
@@ -80,7 +80,7 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   const auto gnss_path = gnss_file(folder, options.gnss);
   if (!gnss_path) return gnss_path.error();
   if (!gnss_path->empty()) {
-    const auto text = read_text(*gnss_path);
+    const auto text = read_file(*gnss_path);
     if (!text) return text.error();
     auto gnss = parse_gnss(*text, gnss_path->string(), options.gnss_defaults, log.remarks);
     if (!gnss) return gnss.error();

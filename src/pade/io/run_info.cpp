@@ -156,6 +156,7 @@ void read_optional_parts(Fields& fields, RunInfo& info) {
     info.world_up.emplace();
     up.read("direction", direction, "three numbers");
     up.read("stated", info.world_up->stated, "true or false");
+    up.read("source", info.world_up->source, "text");
     if (direction.size() == 3)
       info.world_up->direction = Eigen::Vector3d(direction[0], direction[1], direction[2]);
   }
@@ -234,7 +235,9 @@ std::string to_json(const RunInfo& info) {
                {"states", json_of_states(info.state_pixels)}};
   if (info.world_up) {
     const Eigen::Vector3d& up = info.world_up->direction;
-    json["world_up"] = {{"direction", {up.x(), up.y(), up.z()}}, {"stated", info.world_up->stated}};
+    json["world_up"] = {{"direction", {up.x(), up.y(), up.z()}},
+                        {"stated", info.world_up->stated},
+                        {"source", info.world_up->source}};
   }
   if (info.origin) {
     json["geographic_origin"] = {{"latitude_deg", info.origin->latitude_deg},

@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "pade/io/atomic_output.hpp"
 #include "pade/io/run_images.hpp"
 #include "pade/io/run_writer.hpp"
+#include "pade/io/text.hpp"
 
 namespace pade::io {
 namespace fs = std::filesystem;

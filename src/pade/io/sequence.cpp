@@ -155,7 +155,7 @@ std::optional<WorldUp> mean_camera_up(const std::vector<FrameEntry>& frames) {
 
 /// `# frame=ENU origin=lat,lon,h` in the head of gnss.csv.
 std::optional<GeographicOrigin> gnss_origin(const fs::path& folder) {
-  const auto text = read_text(folder / "gnss.csv");
+  const auto text = read_file(folder / "gnss.csv");
   if (!text) return std::nullopt;
   const std::string_view head = std::string_view(*text).substr(0, text->find('\n'));
   constexpr std::string_view kKey = "origin=";

@@ -28,12 +28,12 @@ bool path_exists(const std::filesystem::path& path) {
   return std::filesystem::exists(path, failure);
 }
 
-Result<std::string> read_text(const std::filesystem::path& file) {
+Result<std::string> read_file(const std::filesystem::path& file) {
   std::error_code failure;
   const auto status = std::filesystem::status(file, failure);
   if (!std::filesystem::exists(status)) return Error{fmt::format("{}: no such file", file.string())};
   if (std::filesystem::is_directory(status)) {
-    return Error{fmt::format("{}: is a folder, expected a text file", file.string())};
+    return Error{fmt::format("{}: is a folder, expected a file", file.string())};
   }
   std::ifstream stream(file, std::ios::binary);
   std::string text;

@@ -15,8 +15,9 @@ namespace pade::io {
 /// Whether there is something of this name; false also where that cannot be found out.
 bool path_exists(const std::filesystem::path& path);
 
-/// The whole file. Refused where it is missing, a folder, unreadable, or longer than 1 GiB.
-Result<std::string> read_text(const std::filesystem::path& file);
+/// The content of a file, text or not. Refused where it is missing, a folder, unreadable, or longer than 1
+/// GiB.
+Result<std::string> read_file(const std::filesystem::path& file);
 
 /// A line that holds data, with its number in the file counted from 1.
 struct Line {

@@ -103,7 +103,7 @@ Result<Trajectory> TrajectoryBuilder::finish(ReadReport& report) {
 }
 
 Result<Trajectory> read_trajectory(const std::filesystem::path& file, ReadReport& report) {
-  const auto text = read_text(file);
+  const auto text = read_file(file);
   if (!text) return text.error();
   return parse_trajectory(*text, file.string(), report);
 }

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 Result<std::vector<StampedFile>> read_image_list(const fs::path& file, std::size_t column,
                                                  ReadReport& report) {
-  const auto text = read_text(file);
+  const auto text = read_file(file);
   if (!text) return text.error();
   return parse_image_list(*text, file, column, report);
 }

@@ -272,7 +272,7 @@ Flight from_file(const FlightFile& f) {
 }  // namespace
 
 Result<Flight> read_flight(const std::filesystem::path& file) {
-  const auto text = io::read_text(file);
+  const auto text = io::read_file(file);
   if (!text) return text.error();
   auto flight = parse_flight(*text, file.string());
   if (flight && flight->name.empty()) flight->name = file.stem().string();

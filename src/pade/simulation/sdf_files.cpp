@@ -73,7 +73,7 @@ Status check(const fs::path& file, const ResourcePaths& resources, std::vector<f
     return Error{fmt::format("{}: found an include of {}, which includes it, expected no cycle",
                              open.back().string(), self.string())};
   }
-  const auto content = io::read_text(file);
+  const auto content = io::read_file(file);
   if (!content) return content.error();
   const std::string text = without_comments(*content);
   if (const Status version = check_version(file, text); !version) return version.error();
@@ -116,7 +116,7 @@ std::optional<fs::path> resolve_uri(const std::string& uri, const fs::path& base
 std::optional<fs::path> model_file(const fs::path& path) {
   std::error_code ignored;
   if (fs::is_regular_file(path, ignored)) return path;
-  if (const auto config = io::read_text(path / "model.config")) {
+  if (const auto config = io::read_file(path / "model.config")) {
     // The newest version comes last by custom.
     std::optional<fs::path> named;
     const std::string text = without_comments(*config);

@@ -149,7 +149,7 @@ void remove_fragments(const fs::path& folder) {
 /// Makes or takes up the work folder of a sequence.
 Status prepare(const fs::path& work, const std::string& text, const SequenceOptions& options) {
   std::error_code failed;
-  const auto found = io::read_text(work / simulation_record);
+  const auto found = io::read_file(work / simulation_record);
   if (found && *found == text) {
     remove_fragments(work);
   } else {
@@ -326,7 +326,7 @@ Status write_sequence(const Scene& scene, const Flight& flight, const fs::path& 
 
   const std::string made_of = record(scene, flight, camera, options);
   if (options.keep_finished) {
-    if (const auto found = io::read_text(out / simulation_record); found && *found == made_of) return {};
+    if (const auto found = io::read_file(out / simulation_record); found && *found == made_of) return {};
   }
   if (const Status s = check_target(out, options.overwrite); !s) return s;
   const fs::path work = partial_folder(out);
