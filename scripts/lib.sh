@@ -105,20 +105,26 @@ job_count() {
   [ "$memory" -lt "$cores" ] && echo "$memory" || echo "$cores"
 }
 
-# build PRESET FOLDER [TARGET...]: configure with a preset of CMakePresets.json, then build.
+# configure PRESET FOLDER: with a preset of CMakePresets.json.
+configure() {
+  local log=$root/$2/build.log
+  mkdir -p "$root/$2"
+  # A folder that was configured by hand keeps its generator.
+  [ -f "$root/$2/CMakeCache.txt" ] || export CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
+  (cd "$root" && cmake --preset "$1") >"$log" 2>&1 || {
+    cat "$log" >&2
+    die "CMake could not configure $2/"
+  }
+}
+
+# build PRESET FOLDER [TARGET...]: configure, then build.
 build() {
   local preset=$1 folder=$2 log=$root/$2/build.log targets=()
   shift 2
   [ $# = 0 ] || targets=(--target "$@")
-  mkdir -p "$root/$folder"
-  # A folder that was configured by hand keeps its generator.
-  [ -f "$root/$folder/CMakeCache.txt" ] || export CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
   say "Building into $folder/ (preset $preset, $(job_count) jobs) ..."
   local start=$SECONDS
-  (cd "$root" && cmake --preset "$preset") >"$log" 2>&1 || {
-    cat "$log" >&2
-    die "CMake could not configure $folder/"
-  }
+  configure "$preset" "$folder"
   # At a terminal the build shows its own progress; in a pipe it speaks only when it fails.
   if [ -t 1 ]; then
     cmake --build "$root/$folder" -j "$(job_count)" "${targets[@]}" || die "the build failed"
