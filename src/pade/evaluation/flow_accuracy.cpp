@@ -69,14 +69,38 @@ cv::Mat endpoint_errors(const cv::Mat& estimate, const cv::Mat& truth) {
   return errors;
 }
 
+namespace {
+
+struct JudgedPixel {
+  float sigma;
+  float error;
+};
+
+// Mean error of the first `kept` pixels.
+double mean_error(const std::vector<JudgedPixel>& pixels, std::size_t kept) {
+  double sum = 0;
+  for (std::size_t i = 0; i < kept; ++i) sum += static_cast<double>(pixels[i].error);
+  return kept > 0 ? sum / static_cast<double>(kept) : kNone;
+}
+
+// AEE of what remains of pixels in this order without the last 0, 5, ... 95 %.
+std::vector<double> remaining_errors(const std::vector<JudgedPixel>& pixels) {
+  constexpr std::size_t kStep = 5;
+  std::vector<double> errors;
+  for (std::size_t left_out = 0; left_out < 100; left_out += kStep)
+    errors.push_back(mean_error(pixels, pixels.size() * (100 - left_out) / 100));
+  return errors;
+}
+
+}  // namespace
+
 FlowConfidenceAccuracy flow_confidence_accuracy(const cv::Mat& estimate, const cv::Mat& sigma,
                                                 const cv::Mat& truth) {
   CV_Assert(sigma.type() == CV_32FC1 && sigma.size() == truth.size());
   constexpr float kWrong = 3;
-  constexpr float kDoubtful = 1;
-  constexpr double kKept = 0.7;
+  constexpr std::size_t kKeptPercent = 70;
   const cv::Mat errors = endpoint_errors(estimate, truth);
-  std::vector<std::pair<float, float>> pixels;  // sigma, error
+  std::vector<JudgedPixel> pixels;
   double wrong = 0;
   double right = 0;
   FlowConfidenceAccuracy result;
@@ -84,20 +108,25 @@ FlowConfidenceAccuracy flow_confidence_accuracy(const cv::Mat& estimate, const c
     for (int u = 0; u < errors.cols; ++u) {
       const float error = errors.at<float>(v, u);
       if (std::isnan(error)) continue;
-      const float deviation = sigma.at<float>(v, u);
-      const bool doubtful = !(deviation <= kDoubtful);
-      pixels.emplace_back(std::isnan(deviation) ? std::numeric_limits<float>::infinity() : deviation, error);
+      float deviation = sigma.at<float>(v, u);
+      if (std::isnan(deviation)) deviation = std::numeric_limits<float>::infinity();
+      const bool doubtful = deviation > kDoubtfulSigma;
+      pixels.push_back({deviation, error});
       (error > kWrong ? wrong : right) += 1;
       result.flagged += error > kWrong && doubtful ? 1 : 0;
       result.trusted += error <= kWrong && !doubtful ? 1 : 0;
+      const cv::Vec2f difference = estimate.at<cv::Vec2f>(v, u) - truth.at<cv::Vec2f>(v, u);
+      for (int c = 0; c < 2; ++c) result.within += std::abs(difference[c]) <= deviation ? 0.5 : 0;
     }
   }
-  std::sort(pixels.begin(), pixels.end());
-  const auto kept = static_cast<std::size_t>(kKept * static_cast<double>(pixels.size()));
-  for (std::size_t i = 0; i < kept; ++i) result.kept_endpoint_error += static_cast<double>(pixels[i].second);
-  result.kept_endpoint_error /= kept > 0 ? static_cast<double>(kept) : kNone;
   result.flagged /= wrong > 0 ? wrong : kNone;
   result.trusted /= right > 0 ? right : kNone;
+  result.within /= pixels.empty() ? kNone : static_cast<double>(pixels.size());
+  std::stable_sort(pixels.begin(), pixels.end(), [](auto& a, auto& b) { return a.sigma < b.sigma; });
+  result.kept_endpoint_error = mean_error(pixels, pixels.size() * kKeptPercent / 100);
+  result.remaining = remaining_errors(pixels);
+  std::sort(pixels.begin(), pixels.end(), [](auto& a, auto& b) { return a.error < b.error; });
+  result.best_remaining = remaining_errors(pixels);
   return result;
 }
 

@@ -54,11 +54,12 @@ std::vector<float> local_mean_taps(double sigma) {
 }
 
 double effective_window(const std::vector<float>& taps) {
+  constexpr double kIndependent = 0.5;
   double squares = 0;
   for (std::size_t i = 0; i < taps.size(); ++i) {
     squares += (i == 0 ? 1.0 : 2.0) * static_cast<double>(taps[i]) * static_cast<double>(taps[i]);
   }
-  return 1 / (squares * squares);  // the two-dimensional sum is the square of the one-dimensional one
+  return kIndependent / (squares * squares);  // the two-dimensional sum is the square of the one-dimensional one
 }
 
 void FlowPlanes::resize(int width, int height) {
