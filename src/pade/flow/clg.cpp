@@ -132,8 +132,6 @@ ClgOptions clg_accurate_options() {
   ClgOptions options;
   options.warps = 4;
   options.coarse_warps = 12;
-  options.alpha = 3;
-  options.gamma = 5;
   options.smooth_epsilon = 0.01;
   return options;
 }

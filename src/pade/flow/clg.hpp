@@ -15,8 +15,8 @@ struct ClgOptions {
   int lagged = 1;
   int sweeps = 8;
   double omega = 1.9;
-  double alpha = 5;
-  double gamma = 10;
+  double alpha = 8;
+  double gamma = 30;
   double normalisation = 0;
   double data_epsilon = 1;
   double smooth_epsilon = 0.02;
