@@ -347,13 +347,13 @@ class EpipolarClgFlow final : public EpipolarPyramid {
 LucasKanadeOptions epipolar_lucas_kanade_options() {
   LucasKanadeOptions options;
   options.iterations = 1;
-  options.coarse_iterations = 4;
+  options.coarse_iterations = 3;
   return options;
 }
 
 ClgOptions epipolar_clg_options() {
   ClgOptions options = clg_fast_options();
-  options.coarse_warps = 4;
+  options.coarse_warps = 3;
   options.sweeps = 6;
   return options;
 }
