@@ -82,7 +82,8 @@ void clg_twins(Twins& twins, simd::InstructionSet set, Images& m) {
     }
   }
   constexpr double kOmega = 1.5;
-  for (int half = 0; half < 6; ++half) {
+  constexpr int kSweeps = 3;
+  for (int half = 0; half < 2 * kSweeps; ++half) {
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
         if ((x + y) % 2 != half % 2) continue;
@@ -123,7 +124,15 @@ void clg_twins(Twins& twins, simd::InstructionSet set, Images& m) {
         PADE_DISPATCH(clg_system, set)(level, cut, kHeight, m.scratch.data());
         PADE_DISPATCH(clg_split, set)(level.u, level.system.u, 0, kHeight);
         PADE_DISPATCH(clg_split, set)(level.v, level.system.v, 0, kHeight);
-        PADE_DISPATCH(clg_relax, set)(level.system, 3, static_cast<float>(kOmega));
+        auto* relax = PADE_DISPATCH(clg_relax, set);
+        const auto omega = static_cast<float>(kOmega);
+        if (first == 0) {
+          relax(level.system, kSweeps, omega, {0, 0, kHeight, 0});
+        } else {
+          relax(level.system, kSweeps, omega, {cut, 1, kHeight, 0});
+          relax(level.system, kSweeps, omega, {0, 0, cut, -1});
+          relax(level.system, kSweeps, omega, {cut, -1, cut, 1});
+        }
         PADE_DISPATCH(clg_join, set)(level.system.u, m.out.view(), 0, kHeight);
       },
       [&](int x, int y) { return su[static_cast<std::size_t>(y * kWidth + x)]; });

@@ -47,14 +47,13 @@ class Clg final : public PyramidFlow {
 
   void refine(int index, int from, int to, FlowPlanes& flow) override {
     LevelMemory& memory = levels_[static_cast<std::size_t>(index)];
-    const int height = flow.u.height();
-    memory.resize(flow.u.width(), height);
+    memory.resize(flow.u.width(), flow.u.height());
     const bool finest = index == finest_level();
     const int warps = finest ? options_.warps : options_.coarse_warps;
     for (int warp = 0; warp < warps; ++warp) {
       ClgLevel level = view(memory, image(from, index), image(to, index), flow);
       level.mask = mask(index);
-      over_rows(height, [&](int first, int last, float*) {
+      over_rows(flow.u.view(), [&](int first, int last, float*) {
         for (int y = first; y < last; ++y) {
           std::copy_n(level.u.row(y), level.u.stride, level.u0.row(y));
           std::copy_n(level.v.row(y), level.v.stride, level.v0.row(y));
@@ -63,15 +62,15 @@ class Clg final : public PyramidFlow {
         PADE_DISPATCH(clg_split, isa())(level.u, level.system.u, first, last);
         PADE_DISPATCH(clg_split, isa())(level.v, level.system.v, first, last);
       });
-      over_rows(height, [&](int first, int last, float* scratch) {
+      over_rows(flow.u.view(), [&](int first, int last, float* scratch) {
         PADE_DISPATCH(clg_tensor, isa())(level, first, last, scratch);
       });
       for (int i = 0; i < options_.lagged; ++i) {
-        over_rows(height, [&](int first, int last, float* scratch) {
+        over_rows(flow.u.view(), [&](int first, int last, float* scratch) {
           PADE_DISPATCH(clg_system, isa())(level, first, last, scratch);
         });
-        PADE_DISPATCH(clg_relax, isa())(level.system, options_.sweeps, static_cast<float>(options_.omega));
-        over_rows(height, [&](int first, int last, float*) {
+        relax(level.system, flow.u.view());
+        over_rows(flow.u.view(), [&](int first, int last, float*) {
           PADE_DISPATCH(clg_join, isa())(level.system.u, level.u, first, last);
           PADE_DISPATCH(clg_join, isa())(level.system.v, level.v, first, last);
         });
@@ -81,6 +80,23 @@ class Clg final : public PyramidFlow {
   }
 
  private:
+  // Strips whose borders retreat by one row with every half-sweep do not touch each other's rows; what they
+  // leave, a wedge around each border, comes after all of them.
+  void relax(const ClgSystem& system, const PlaneView& plane) {
+    const auto sweep = [&](const SweepRows& rows) {
+      PADE_DISPATCH(clg_relax, isa())
+      (system, options_.sweeps, static_cast<float>(options_.omega), rows);
+    };
+    const int smallest = 4 * options_.sweeps;
+    over_rows(
+        plane,
+        [&](int first, int last, float*) {
+          sweep({first, first > 0 ? 1 : 0, last, last < plane.height ? -1 : 0});
+        },
+        smallest);
+    for (const int border : strip_borders(plane, smallest)) sweep({border, -1, border, 1});
+  }
+
   [[nodiscard]] ClgLevel view(const LevelMemory& m, const PlaneView& first, const PlaneView& second,
                               const FlowPlanes& flow) const {
     ClgLevel level;

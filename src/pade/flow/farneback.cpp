@@ -76,15 +76,14 @@ class Farneback final : public PyramidFlow {
       const PlaneView& level = image(slot, index);
       Expansion& expansion = expansions[static_cast<std::size_t>(index)];
       expansion.resize(level.width, level.height);
-      over_rows(level.height, [&](int begin, int end, float* scratch) {
+      over_rows(level, [&](int begin, int end, float* scratch) {
         PADE_DISPATCH(farneback_expand, isa())(level, expansion.view(), filters_.view, begin, end, scratch);
       });
     }
   }
 
   void refine(int index, int from, int to, FlowPlanes& flow) override {
-    const int height = flow.u.height();
-    spare_.resize(flow.u.width(), height);
+    spare_.resize(flow.u.width(), flow.u.height());
     FarnebackLevel level;
     level.first = expansions_[static_cast<std::size_t>(from)][static_cast<std::size_t>(index)].view();
     level.second = expansions_[static_cast<std::size_t>(to)][static_cast<std::size_t>(index)].view();
@@ -99,7 +98,7 @@ class Farneback final : public PyramidFlow {
       level.v = flow.v.view();
       level.next_u = spare_.u.view();
       level.next_v = spare_.v.view();
-      over_rows(height, [&](int begin, int end, float* scratch) {
+      over_rows(flow.u.view(), [&](int begin, int end, float* scratch) {
         PADE_DISPATCH(farneback_iterate, isa())(level, begin, end, scratch);
       });
       std::swap(flow, spare_);

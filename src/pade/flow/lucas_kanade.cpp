@@ -36,7 +36,7 @@ class LucasKanade final : public PyramidFlow {
       const PlaneView& from = image(slot, index);
       Plane& to = filtered[static_cast<std::size_t>(index)];
       to.resize(from.width, from.height);
-      over_rows(from.height, [&](int begin, int end, float* scratch) {
+      over_rows(from, [&](int begin, int end, float* scratch) {
         PADE_DISPATCH(smooth, isa())
         (from, to.view(), mean_taps_.data(), static_cast<int>(mean_taps_.size()) - 1, begin, end, scratch);
         PADE_DISPATCH(subtract_from, isa())(from, to.view(), begin, end);
@@ -63,10 +63,10 @@ class LucasKanade final : public PyramidFlow {
     level.radius = options_.radius;
     level.damping = static_cast<float>(options_.damping);
     level.largest_step = static_cast<float>(options_.largest_step);
-    over_rows(first.height, [&](int begin, int end, float* scratch) {
+    over_rows(first, [&](int begin, int end, float* scratch) {
       PADE_DISPATCH(gradient, isa())(first, level.gradient_x, level.gradient_y, begin, end, scratch);
     });
-    over_rows(first.height, [&](int begin, int end, float* scratch) {
+    over_rows(first, [&](int begin, int end, float* scratch) {
       PADE_DISPATCH(lucas_kanade_prepare, isa())(level, begin, end, scratch);
     });
     const bool finest = index == finest_level();
@@ -75,7 +75,7 @@ class LucasKanade final : public PyramidFlow {
       level.v = flow.v.view();
       level.next_u = spare_.u.view();
       level.next_v = spare_.v.view();
-      over_rows(first.height, [&](int begin, int end, float* scratch) {
+      over_rows(first, [&](int begin, int end, float* scratch) {
         PADE_DISPATCH(lucas_kanade_iterate, isa())(level, begin, end, scratch);
       });
       std::swap(flow, spare_);

@@ -14,8 +14,8 @@ bool usable(const cv::Mat& image) {
   return !image.empty() && (image.type() == CV_8UC1 || image.type() == CV_16UC1);
 }
 
-// Rows below which a strip is not worth a thread.
-constexpr int kSmallestStrip = 16;
+// Pixels below which a strip is not worth a thread.
+constexpr long kSmallestArea = 4096;
 
 // Window over which the confidence is judged, and the least noise of grey values that is assumed there.
 constexpr double kSigmaWindow = 2.5;
@@ -111,7 +111,7 @@ cv::Mat PyramidFlow::sigma(int from, int to) {
   input.radius = kSigmaRadius;
   input.noise = kGreyNoise;
   input.effective_size = static_cast<float>(effective_window(sigma_taps_));
-  over_rows(input.first.height, [&](int first, int last, float* scratch) {
+  over_rows(input.first, [&](int first, int last, float* scratch) {
     PADE_DISPATCH(flow_sigma, isa_)(input, first, last, scratch);
   });
   cv::Mat result(input.first.height, input.first.width, CV_32FC1);
@@ -164,19 +164,31 @@ void PyramidFlow::start(int level, const cv::Mat& initial) {
     return;
   }
   spare_.resize(size.width, size.height);
-  over_rows(size.height, [&](int first, int last, float*) {
+  over_rows(size, [&](int first, int last, float*) {
     PADE_DISPATCH(upsample, isa_)(flow_.u.view(), spare_.u.view(), 2, first, last);
     PADE_DISPATCH(upsample, isa_)(flow_.v.view(), spare_.v.view(), 2, first, last);
   });
   std::swap(flow_, spare_);
 }
 
-void PyramidFlow::over_rows(int height, const std::function<void(int, int, float*)>& work) {
-  const int strips = std::clamp(height / kSmallestStrip, 1, workers_.size());
-  if (strips == 1) return work(0, height, scratch_[0].data());
-  workers_.run([&](int i) {
-    if (i < strips)
-      work(height * i / strips, height * (i + 1) / strips, scratch_[static_cast<std::size_t>(i)].data());
+std::vector<int> PyramidFlow::strip_borders(const PlaneView& plane, int smallest) const {
+  const long by_area = static_cast<long>(plane.width) * plane.height / kSmallestArea;
+  const int strips = static_cast<int>(
+      std::clamp(std::min<long>(by_area, plane.height / smallest), 1L, static_cast<long>(workers_.size())));
+  std::vector<int> borders;
+  for (int i = 1; i < strips; ++i) borders.push_back(plane.height * i / strips);
+  return borders;
+}
+
+void PyramidFlow::over_rows(const PlaneView& plane, const std::function<void(int, int, float*)>& work,
+                            int smallest) {
+  std::vector<int> begins = strip_borders(plane, smallest);
+  if (begins.empty()) return work(0, plane.height, scratch_[0].data());
+  begins.insert(begins.begin(), 0);
+  begins.push_back(plane.height);
+  workers_.run([&](int thread) {
+    const auto i = static_cast<std::size_t>(thread);
+    if (i + 1 < begins.size()) work(begins[i], begins[i + 1], scratch_[i].data());
   });
 }
 
@@ -184,7 +196,7 @@ void PyramidFlow::median(int size, FlowPlanes& flow, FlowPlanes& spare) {
   if (size < 3) return;
   auto* filter = size == 3 ? PADE_DISPATCH(median3, isa_) : PADE_DISPATCH(median5, isa_);
   spare.resize(flow.u.width(), flow.u.height());
-  over_rows(flow.u.height(), [&](int first, int last, float* scratch) {
+  over_rows(flow.u.view(), [&](int first, int last, float* scratch) {
     filter(flow.u.view(), spare.u.view(), first, last, scratch);
     filter(flow.v.view(), spare.v.view(), first, last, scratch);
   });

@@ -23,6 +23,7 @@ class PyramidFlow : public FlowEstimator {
   void set_mask(const cv::Mat& mask) final;
 
  protected:
+  static constexpr int kSmallestStrip = 16;
   explicit PyramidFlow(const FlowOptions& options);
 
   /// The image of a slot (0 or 1) has changed: compute what depends on it alone.
@@ -41,11 +42,13 @@ class PyramidFlow : public FlowEstimator {
   [[nodiscard]] int finest_level() const { return options_.half_resolution && count_ > 1 ? 1 : 0; }
   [[nodiscard]] simd::InstructionSet isa() const { return isa_; }
 
-  /// Runs work(first, last, scratch) over strips of rows that cover [0, height).
-  void over_rows(int height, const std::function<void(int, int, float*)>& work);
+  /// Runs work(first, last, scratch) over strips of rows that cover the plane, each of `smallest` rows at least.
+  void over_rows(const PlaneView& plane, const std::function<void(int, int, float*)>& work,
+                 int smallest = kSmallestStrip);
+  /// The first rows of those strips but that of the first one.
+  [[nodiscard]] std::vector<int> strip_borders(const PlaneView& plane, int smallest = kSmallestStrip) const;
   /// Median filter of both components; `size` 0, 3 or 5.
   void median(int size, FlowPlanes& flow, FlowPlanes& spare);
-  WorkerPool& workers() { return workers_; }
 
  private:
   void load(const cv::Mat& image, int slot);

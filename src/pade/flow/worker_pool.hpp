@@ -1,15 +1,15 @@
 // A few threads that work on strips of an image. The strips' results do not depend on how many there are.
 #pragma once
 
-#include <condition_variable>
+#include <atomic>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <vector>
 
 namespace pade::flow {
 
-/// `threads` - 1 helpers beside the calling thread; they sleep between calls.
+/// `threads` - 1 helpers beside the calling thread. One pair of images is some hundred short rounds of work, so
+/// whoever waits for the next one looks for a while before he sleeps.
 class WorkerPool {
  public:
   explicit WorkerPool(int threads) {
@@ -18,11 +18,8 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
   ~WorkerPool() {
-    {
-      const std::lock_guard lock(mutex_);
-      stop_ = true;
-    }
-    wake_.notify_all();
+    work_ = nullptr;
+    announce();
     for (std::thread& helper : helpers_) helper.join();
   }
 
@@ -31,47 +28,46 @@ class WorkerPool {
   /// Calls work(0) to work(size() - 1), one on each thread, and waits for all.
   void run(const std::function<void(int)>& work) {
     if (helpers_.empty()) return work(0);
-    {
-      const std::lock_guard lock(mutex_);
-      work_ = &work;
-      pending_ = static_cast<int>(helpers_.size());
-      ++round_;
-    }
-    wake_.notify_all();
+    work_ = &work;
+    pending_.store(static_cast<int>(helpers_.size()), std::memory_order_relaxed);
+    announce();
     work(0);
-    std::unique_lock lock(mutex_);
-    done_.wait(lock, [this] { return pending_ == 0; });
+    for (int left = pending_.load(std::memory_order_acquire); left != 0;) left = after(pending_, left);
   }
 
  private:
+  void announce() {
+    round_.fetch_add(1, std::memory_order_release);
+    round_.notify_all();
+  }
+
+  // Waits until the value is another than `old`, and returns it.
+  static int after(const std::atomic<int>& value, int old) {
+    constexpr int kLooks = 4000;  // some tens of microseconds
+    for (int i = 0; i < kLooks; ++i) {
+      const int now = value.load(std::memory_order_acquire);
+      if (now != old) return now;
+#if defined(__x86_64__)
+      __builtin_ia32_pause();
+#endif
+    }
+    value.wait(old, std::memory_order_acquire);
+    return value.load(std::memory_order_acquire);
+  }
+
   void serve(int index) {
-    long seen = 0;
-    for (;;) {
-      const std::function<void(int)>* work = nullptr;
-      {
-        std::unique_lock lock(mutex_);
-        wake_.wait(lock, [&] { return stop_ || round_ != seen; });
-        if (stop_) return;
-        seen = round_;
-        work = work_;
-      }
-      (*work)(index);
-      {
-        const std::lock_guard lock(mutex_);
-        --pending_;
-      }
-      done_.notify_one();
+    for (int seen = 0;;) {
+      seen = after(round_, seen);
+      if (work_ == nullptr) return;
+      (*work_)(index);
+      if (pending_.fetch_sub(1, std::memory_order_acq_rel) == 1) pending_.notify_one();
     }
   }
 
   std::vector<std::thread> helpers_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::condition_variable done_;
-  const std::function<void(int)>* work_ = nullptr;
-  int pending_ = 0;
-  long round_ = 0;
-  bool stop_ = false;
+  const std::function<void(int)>* work_ = nullptr;  // written before round_, read after it
+  std::atomic<int> round_{0};
+  std::atomic<int> pending_{0};
 };
 
 }  // namespace pade::flow

@@ -246,12 +246,13 @@ PADE_INLINE void relax_row(const ClgSystem& s, int y, int parity, float omega) {
 // Half-sweep j visits row y once half-sweep j - 1 has left row y + 1, so all sweeps follow each other down
 // the image and work on rows that are still in the cache. The order of operations on each pixel is that of
 // plain red-black sweeps.
-void clg_relax(const ClgSystem& system, int sweeps, float omega) {
-  const int height = system.u.height;
-  for (int step = 0; step < height + 2 * sweeps - 1; ++step) {
-    for (int j = 0; j < 2 * sweeps; ++j) {
+void clg_relax(const ClgSystem& system, int sweeps, float omega, const SweepRows& rows) {
+  const int halves = 2 * sweeps;
+  for (int step = rows.first - halves; step < rows.last + 2 * halves; ++step) {
+    for (int j = 0; j < halves; ++j) {
       const int y = step - j;
-      if (y >= 0 && y < height) relax_row(system, y, (y + j) & 1, omega);
+      if (y >= rows.first + j * rows.first_step && y < rows.last + j * rows.last_step)
+        relax_row(system, y, (y + j) & 1, omega);
     }
   }
 }
