@@ -92,15 +92,16 @@ void farneback_iterate(const FarnebackLevel& level, int first, int last, float* 
           I seen = I(at_x == target_x) & I(at_y == target_y);
           if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
           const I at = truncate(at_y) * stride + truncate(at_x);
+          const bool run = consecutive(at);
           const V du = at_x - here;
           const V dv = at_y - static_cast<float>(y);
-          const V axx = 0.5F * (load(level.first.axx.row(y) + x) + gather(level.second.axx.data, at));
-          const V ayy = 0.5F * (load(level.first.ayy.row(y) + x) + gather(level.second.ayy.data, at));
+          const V axx = 0.5F * (load(level.first.axx.row(y) + x) + fetch(level.second.axx.data, at, run));
+          const V ayy = 0.5F * (load(level.first.ayy.row(y) + x) + fetch(level.second.ayy.data, at, run));
           // Half of the mixed coefficient is the matrix's off-diagonal; another half averages the images.
-          const V axy = 0.25F * (load(level.first.axy.row(y) + x) + gather(level.second.axy.data, at));
-          const V bx = 0.5F * (load(level.first.bx.row(y) + x) - gather(level.second.bx.data, at)) +
+          const V axy = 0.25F * (load(level.first.axy.row(y) + x) + fetch(level.second.axy.data, at, run));
+          const V bx = 0.5F * (load(level.first.bx.row(y) + x) - fetch(level.second.bx.data, at, run)) +
                        axx * du + axy * dv;
-          const V by = 0.5F * (load(level.first.by.row(y) + x) - gather(level.second.by.data, at)) +
+          const V by = 0.5F * (load(level.first.by.row(y) + x) - fetch(level.second.by.data, at, run)) +
                        axy * du + ayy * dv;
           // What leaves the image has no weight.
           store(out[0] + x, select(seen, axx * axx + axy * axy, V{}));

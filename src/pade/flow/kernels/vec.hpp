@@ -94,6 +94,25 @@ PADE_INLINE V select(I mask, V yes, V no) { return mask ? yes : no; }
 // Into [low, high]; NaN becomes low.
 PADE_INLINE V clamp(V a, float low, float high) { return min(max(a, set(low)), set(high)); }
 
+// Whether the lanes of an index count up by one. Flow is smooth, so most vectors of targets do, and a plain load
+// takes the place of a slow gather.
+PADE_INLINE bool consecutive(I at) {
+  const I steps = at - (truncate(ramp()) + at[0]);
+#if defined(__AVX512F__)
+  return _mm512_test_epi32_mask(__m512i(steps), __m512i(steps)) == 0;
+#elif defined(__AVX2__)
+  return _mm256_testz_si256(__m256i(steps), __m256i(steps)) != 0;
+#elif defined(__SSE2__)
+  return _mm_movemask_epi8(_mm_cmpeq_epi32(__m128i(steps), __m128i{})) == 0xffff;
+#else
+  return (steps[0] | steps[1] | steps[2] | steps[3]) == 0;
+#endif
+}
+// base[at], given consecutive(at).
+PADE_INLINE V fetch(const float* base, I at, bool is_consecutive) {
+  return is_consecutive ? load(base + at[0]) : gather(base, at);
+}
+
 // The bilinear value of a plane at (x, y), which must lie in [0, width - 1] x [0, height - 1]. Rows have a
 // spare element behind their end and planes a spare row, so that the far corner needs no test.
 PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
@@ -102,10 +121,11 @@ PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
   const V ax = x - to_float(ix);
   const V ay = y - to_float(iy);
   const I at = iy * stride + ix;
-  const V a = gather(plane, at);
-  const V b = gather(plane + 1, at);
-  const V c = gather(plane + stride, at);
-  const V d = gather(plane + stride + 1, at);
+  const bool run = consecutive(at);
+  const V a = fetch(plane, at, run);
+  const V b = fetch(plane + 1, at, run);
+  const V c = fetch(plane + stride, at, run);
+  const V d = fetch(plane + stride + 1, at, run);
   const V top = a + ax * (b - a);
   const V bottom = c + ax * (d - c);
   return top + ay * (bottom - top);
