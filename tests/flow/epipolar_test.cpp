@@ -1,5 +1,6 @@
 #include "pade/flow/epipolar.hpp"
 
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <string>
@@ -119,6 +120,74 @@ TEST_P(EpipolarMethods, SurviveEverySizeAndUndefinedLines) {
   EXPECT_TRUE(method->estimate(cv::Mat(), cv::Mat(), {}).empty());
   const cv::Mat image(9, 9, CV_8UC1, cv::Scalar(3));
   EXPECT_TRUE(method->estimate(image, image, {cv::Mat(), cv::Mat(8, 9, CV_32FC2)}).empty());
+}
+
+TEST_P(EpipolarMethods, SurviveImagesThatSayNothing) {
+  auto method = make(FlowConfidence::local);
+  const cv::Size size(75, 61);
+  cv::Mat noise(size, CV_8UC1);
+  cv::randu(noise, 0, 256);
+  cv::Mat stripes(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) stripes.at<std::uint8_t>(y, x) = (x + y) % 2 == 0 ? 0 : 255;
+  }
+  const std::vector<cv::Mat> images = {cv::Mat(size, CV_8UC1, cv::Scalar(0)),
+                                       cv::Mat(size, CV_8UC1, cv::Scalar(255)), noise, stripes};
+  EpipolarField lines;
+  lines.direction = cv::Mat(size, CV_32FC2, cv::Scalar(-0.8, 0.6));
+  for (const cv::Mat& first : images) {
+    for (const cv::Mat& second : images) {
+      const EpipolarFlow flow = method->estimate(first, second, lines);
+      EXPECT_TRUE(cv::checkRange(flow.flow.vectors));
+      EXPECT_TRUE(cv::checkRange(flow.distance));
+      EXPECT_EQ(cv::countNonZero(flow.flow.sigma != flow.flow.sigma), 0);
+      EXPECT_EQ(cv::countNonZero(flow.across != flow.across), 0);
+      EXPECT_LT(cv::norm(flow.distance, cv::NORM_INF), 1000);
+    }
+  }
+  EXPECT_EQ(cv::norm(method->estimate(images[0], images[0], lines).distance, cv::NORM_INF), 0)
+      << "nothing moves in a black image";
+}
+
+TEST_P(EpipolarMethods, DoNotDependOnStridesNorOnThePastNorOnTheDepthOfGreyValues) {
+  const testing::ForwardFlight flight;
+  const cv::Rect part(31, 17, 201, 143);
+  EpipolarField lines;
+  lines.direction = flight.lines.direction(part);
+  lines.base = cv::Mat(flight.first.size(), CV_32FC2, cv::Scalar(0.25, 0.5))(part);
+  auto method = make(FlowConfidence::local);
+  const EpipolarFlow view = method->estimate(flight.first(part), flight.second(part), lines);
+  method->estimate(flight.second, flight.first, flight.lines);
+  const EpipolarFlow copy =
+      method->estimate(flight.first(part).clone(), flight.second(part).clone(),
+                       {lines.base.clone(), lines.direction.clone()});
+  EXPECT_EQ(cv::norm(view.distance, copy.distance, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(view.flow.vectors, copy.flow.vectors, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(view.across, copy.across, cv::NORM_INF), 0);
+  cv::Mat first;
+  cv::Mat second;
+  flight.first(part).convertTo(first, CV_16U, 257);
+  flight.second(part).convertTo(second, CV_16U, 257);
+  const EpipolarFlow wide = method->estimate(first, second, lines);
+  EXPECT_LT(cv::norm(wide.distance, view.distance, cv::NORM_L1) / static_cast<double>(wide.distance.total()), 1e-3);
+}
+
+TEST_P(EpipolarMethods, RefuseWhatDoesNotFitAndIgnoreAWildPrediction) {
+  auto method = make();
+  const cv::Size size(90, 70);
+  const testing::ShiftedPair pair = testing::shifted_pair(size, {1, 0});
+  EpipolarField lines;
+  lines.direction = cv::Mat(size, CV_32FC2, cv::Scalar(1, 0));
+  EXPECT_TRUE(method->estimate(pair.first, cv::Mat(70, 91, CV_8UC1), lines).empty());
+  EXPECT_TRUE(method->estimate(pair.first, cv::Mat(size, CV_16UC1), lines).empty());
+  EXPECT_TRUE(method->estimate(cv::Mat(size, CV_8UC3), cv::Mat(size, CV_8UC3), lines).empty());
+  EXPECT_TRUE(method->estimate(pair.first, pair.second, {cv::Mat(size, CV_32FC1), lines.direction}).empty());
+  cv::Mat predicted(size, CV_32FC1, cv::Scalar(1));
+  predicted.rowRange(0, 20) = std::numeric_limits<float>::quiet_NaN();
+  predicted.rowRange(20, 40) = std::numeric_limits<float>::infinity();
+  predicted.rowRange(40, 50) = std::numeric_limits<float>::max();
+  EXPECT_TRUE(cv::checkRange(method->estimate(pair.first, pair.second, lines, predicted).flow.vectors));
+  EXPECT_FALSE(method->estimate(pair.first, pair.second, lines, cv::Mat(3, 3, CV_32FC1, cv::Scalar(9))).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, EpipolarMethods, ::testing::Values("lucas-kanade", "clg-fast"),

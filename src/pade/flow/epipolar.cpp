@@ -129,11 +129,12 @@ class EpipolarPyramid : public EpipolarEstimator {
     const Plane& full = first_.levels[0];
     if (!fits(initial, CV_32FC1, {full.width(), full.height()})) return;
     const float factor = 1.0F / static_cast<float>(1 << level);
+    const auto farthest = static_cast<float>(full.width() + full.height());  // beyond it all leaves the image
     for (int y = 0; y < size.height(); ++y) {
       for (int x = 0; x < size.width(); ++x) {
         const float d =
             initial.at<float>(std::min(y << level, initial.rows - 1), std::min(x << level, initial.cols - 1));
-        distance_.row(y)[x] = std::isfinite(d) ? d * factor : 0;
+        distance_.row(y)[x] = std::abs(d) <= farthest ? d * factor : 0;
       }
     }
   }

@@ -45,7 +45,7 @@ class EpipolarEstimator {
   /// @param lines          of that size.
   /// @param initial        CV_32FC1 of that size, pixels: distances predicted from the last depth; empty =
   /// zero,
-  ///                       NaN counts as zero.
+  ///                       NaN, and distances that leave the image, count as zero.
   /// @return an empty result where types or sizes do not fit.
   virtual EpipolarFlow estimate(const cv::Mat& first, const cv::Mat& second, const EpipolarField& lines,
                                 const cv::Mat& initial) = 0;

@@ -68,16 +68,20 @@ void FlowPlanes::resize(int width, int height) {
 }
 
 void load_flow(const cv::Mat& vectors, int level, FlowPlanes& flow) {
-  cv::Mat scaled;
+  cv::Mat known = vectors.clone();
+  for (int y = 0; y < known.rows; ++y) {
+    auto* row = known.ptr<cv::Vec2f>(y);
+    for (int x = 0; x < known.cols; ++x) {
+      const bool usable = std::abs(row[x][0]) <= static_cast<float>(known.cols) &&
+                          std::abs(row[x][1]) <= static_cast<float>(known.rows);
+      if (!usable) row[x] = {0, 0};
+    }
+  }
+  cv::Mat scaled = known;
   if (level > 0) {
     cv::Size size = vectors.size();
     for (int i = 0; i < level; ++i) size = {(size.width + 1) / 2, (size.height + 1) / 2};
-    cv::Mat clean = vectors.clone();
-    cv::patchNaNs(clean, 0);
-    cv::resize(clean, scaled, size, 0, 0, cv::INTER_AREA);
-  } else {
-    scaled = vectors.clone();
-    cv::patchNaNs(scaled, 0);
+    cv::resize(known, scaled, size, 0, 0, cv::INTER_AREA);
   }
   const float factor = 1.0F / static_cast<float>(1 << level);
   flow.resize(scaled.cols, scaled.rows);
