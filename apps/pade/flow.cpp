@@ -4,6 +4,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "pade/flow/flow_estimator.hpp"
@@ -42,6 +43,10 @@ Status compute(const FlowArguments& arguments) {
                              second->rows, first->cols, first->rows, arguments.first)};
   }
   const FlowField field = (*method)->estimate(*first, *second);
+  if (cv::Mat known = field.vectors.reshape(1) == field.vectors.reshape(1); cv::countNonZero(known) == 0) {
+    return Error{fmt::format("{}: {} finds no flow in images of {} x {} pixels", arguments.first,
+                             arguments.method, first->cols, first->rows)};
+  }
   if (!arguments.out.empty()) {
     if (Status written = io::write_flow(arguments.out, field.vectors); !written) return written;
   }

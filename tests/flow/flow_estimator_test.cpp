@@ -307,6 +307,22 @@ INSTANTIATE_TEST_SUITE_P(Methods, OwnFlow,
                            return text;
                          });
 
+TEST(OpenCvFlow, SurvivesEverySizeAndRefusesImagesThatDoNotFit) {
+  for (const std::string name : {"dis-ultrafast", "dis-fast", "dis-medium", "opencv-farneback", "opencv-pyrlk"}) {
+    auto method = make(name);
+    for (const cv::Size size :
+         {cv::Size(1, 1), cv::Size(37, 1), cv::Size(1, 37), cv::Size(11, 9), cv::Size(65, 47)}) {
+      const ShiftedPair pair = shifted_pair(size, {0.5, 0.25});
+      EXPECT_EQ(method->estimate(pair.first, pair.second).vectors.size(), size) << name;
+    }
+    const cv::Mat image(40, 40, CV_8UC1, cv::Scalar(7));
+    EXPECT_TRUE(method->estimate(image, cv::Mat(40, 41, CV_8UC1)).empty()) << name;
+    EXPECT_TRUE(method->estimate(image, cv::Mat()).empty()) << name;
+    EXPECT_TRUE(method->estimate(cv::Mat(40, 40, CV_8UC3), image).empty()) << name;
+    EXPECT_FALSE(method->estimate(image, image, cv::Mat(3, 3, CV_32FC2)).empty()) << name;
+  }
+}
+
 TEST(FlowEstimatorNames, AllCanBeMadeAndKnowTheirName) {
   for (const std::string& name : flow_estimator_names()) {
     const auto method = make_flow_estimator(name);

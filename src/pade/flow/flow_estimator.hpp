@@ -61,8 +61,8 @@ class FlowEstimator {
   /// @param first, second  CV_8UC1, one size, any stride. Our own methods take CV_16UC1 as well.
   /// @param initial  CV_32FC2 of that size, pixels: where to start the search; empty = zero. NaN, and vectors
   /// that leave the image wherever they start, count as zero. Methods that cannot use it ignore it.
-  /// @return vectors of the images' size; NaN where the method knows that it failed; sigma where it has one. Our
-  /// own methods return an empty field where the images are empty, of another type, or differ in size.
+  /// @return vectors of the images' size; NaN where the method knows that it failed; sigma where it has one;
+  /// an empty field where the images are empty, of another type, or differ in size.
   virtual FlowField estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) = 0;
   FlowField estimate(const cv::Mat& first, const cv::Mat& second) {
     return estimate(first, second, cv::Mat());
