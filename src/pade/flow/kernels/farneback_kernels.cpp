@@ -92,16 +92,19 @@ void farneback_iterate(const FarnebackLevel& level, int first, int last, float* 
           I seen = I(at_x == target_x) & I(at_y == target_y);
           if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
           const I at = truncate(at_y) * stride + truncate(at_x);
-          const bool run = consecutive(at);
+          const ExpansionView& to = level.second;
+          const float* const planes[5] = {to.axx.data, to.ayy.data, to.axy.data, to.bx.data, to.by.data};
+          V second[5];
+          fetch(planes, at, second);
           const V du = at_x - here;
           const V dv = at_y - static_cast<float>(y);
-          const V axx = 0.5F * (load(level.first.axx.row(y) + x) + fetch(level.second.axx.data, at, run));
-          const V ayy = 0.5F * (load(level.first.ayy.row(y) + x) + fetch(level.second.ayy.data, at, run));
+          const V axx = 0.5F * (load(level.first.axx.row(y) + x) + second[0]);
+          const V ayy = 0.5F * (load(level.first.ayy.row(y) + x) + second[1]);
           // Half of the mixed coefficient is the matrix's off-diagonal; another half averages the images.
-          const V axy = 0.25F * (load(level.first.axy.row(y) + x) + fetch(level.second.axy.data, at, run));
-          const V bx = 0.5F * (load(level.first.bx.row(y) + x) - fetch(level.second.bx.data, at, run)) +
+          const V axy = 0.25F * (load(level.first.axy.row(y) + x) + second[2]);
+          const V bx = 0.5F * (load(level.first.bx.row(y) + x) - second[3]) +
                        axx * du + axy * dv;
-          const V by = 0.5F * (load(level.first.by.row(y) + x) - fetch(level.second.by.data, at, run)) +
+          const V by = 0.5F * (load(level.first.by.row(y) + x) - second[4]) +
                        axy * du + ayy * dv;
           // What leaves the image has no weight.
           store(out[0] + x, select(seen, axx * axx + axy * axy, V{}));

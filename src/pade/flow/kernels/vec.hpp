@@ -94,23 +94,34 @@ PADE_INLINE V select(I mask, V yes, V no) { return mask ? yes : no; }
 // Into [low, high]; NaN becomes low.
 PADE_INLINE V clamp(V a, float low, float high) { return min(max(a, set(low)), set(high)); }
 
-// Whether the lanes of an index count up by one. Flow is smooth, so most vectors of targets do, and a plain load
-// takes the place of a slow gather.
-PADE_INLINE bool consecutive(I at) {
-  const I steps = at - (truncate(ramp()) + at[0]);
+PADE_INLINE bool all(I mask) {
 #if defined(__AVX512F__)
-  return _mm512_test_epi32_mask(__m512i(steps), __m512i(steps)) == 0;
+  return _mm512_test_epi32_mask(__m512i(mask), __m512i(mask)) == kAll;
 #elif defined(__AVX2__)
-  return _mm256_testz_si256(__m256i(steps), __m256i(steps)) != 0;
+  return _mm256_movemask_epi8(__m256i(mask)) == -1;
 #elif defined(__SSE2__)
-  return _mm_movemask_epi8(_mm_cmpeq_epi32(__m128i(steps), __m128i{})) == 0xffff;
+  return _mm_movemask_epi8(__m128i(mask)) == 0xffff;
 #else
-  return (steps[0] | steps[1] | steps[2] | steps[3]) == 0;
+  return (mask[0] & mask[1] & mask[2] & mask[3]) != 0;
 #endif
 }
-// base[at], given consecutive(at).
-PADE_INLINE V fetch(const float* base, I at, bool is_consecutive) {
-  return is_consecutive ? load(base + at[0]) : gather(base, at);
+
+// out[i] = planes[i][at]. Flow is smooth: most indices count up by one from the first lane on, or jump once in
+// between, and plain loads take the place of slow gathers. Planes have a spare row behind their end.
+template <int kCount>
+PADE_INLINE void fetch(const float* const (&planes)[kCount], I at, V (&out)[kCount]) {
+  const I start = at - truncate(ramp());
+  const I like_first = start == start[0];
+  const int from_first = start[0];
+  const int from_last = start[kLanes - 1];
+  if (all(like_first)) {
+    for (int i = 0; i < kCount; ++i) out[i] = load(planes[i] + from_first);
+  } else if (from_last >= 0 && all(like_first | (start == from_last))) {
+    for (int i = 0; i < kCount; ++i)
+      out[i] = select(like_first, load(planes[i] + from_first), load(planes[i] + from_last));
+  } else {
+    for (int i = 0; i < kCount; ++i) out[i] = gather(planes[i], at);
+  }
 }
 
 // The bilinear value of a plane at (x, y), which must lie in [0, width - 1] x [0, height - 1]. Rows have a
@@ -121,13 +132,11 @@ PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
   const V ax = x - to_float(ix);
   const V ay = y - to_float(iy);
   const I at = iy * stride + ix;
-  const bool run = consecutive(at);
-  const V a = fetch(plane, at, run);
-  const V b = fetch(plane + 1, at, run);
-  const V c = fetch(plane + stride, at, run);
-  const V d = fetch(plane + stride + 1, at, run);
-  const V top = a + ax * (b - a);
-  const V bottom = c + ax * (d - c);
+  const float* const corners[4] = {plane, plane + 1, plane + stride, plane + stride + 1};
+  V v[4];
+  fetch(corners, at, v);
+  const V top = v[0] + ax * (v[1] - v[0]);
+  const V bottom = v[2] + ax * (v[3] - v[2]);
   return top + ay * (bottom - top);
 }
 
