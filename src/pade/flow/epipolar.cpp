@@ -84,7 +84,7 @@ class EpipolarPyramid : public EpipolarEstimator {
   Pyramid first_, second_;
   std::vector<LinePlanes> lines_;  // by level
   Plane distance_, spare_;
-  std::vector<float> scratch_;
+  AlignedFloats scratch_;
 
  private:
   void load_lines(const EpipolarField& field) {

@@ -5,10 +5,33 @@
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
+#include <new>
+#include <vector>
 
 #include "pade/flow/kernels/plane_view.hpp"
 
 namespace pade::flow {
+
+/// Whole vectors at multiples of kRowMultiple never straddle two cache lines.
+inline constexpr std::size_t kAlignment = 128;
+
+template <class Value>
+struct AlignedAllocator {
+  using value_type = Value;
+  AlignedAllocator() = default;
+  template <class Other>
+  explicit AlignedAllocator(const AlignedAllocator<Other>& /*other*/) {}
+  Value* allocate(std::size_t count) {
+    return static_cast<Value*>(::operator new(count * sizeof(Value), std::align_val_t(kAlignment)));
+  }
+  void deallocate(Value* memory, std::size_t /*count*/) {
+    ::operator delete(memory, std::align_val_t(kAlignment));
+  }
+  friend bool operator==(const AlignedAllocator&, const AlignedAllocator&) { return true; }
+};
+
+/// Scratch memory of kernels.
+using AlignedFloats = std::vector<float, AlignedAllocator<float>>;
 
 /// A float image with aligned, padded rows. Growing reallocates and zeroes; shrinking keeps the memory, so a
 /// stream of frames of one size allocates once.
@@ -45,7 +68,6 @@ class Plane {
   }
 
  private:
-  static constexpr std::size_t kAlignment = 128;
   struct Free {
     void operator()(float* memory) const { std::free(memory); }
   };

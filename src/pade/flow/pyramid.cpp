@@ -21,7 +21,7 @@ void Pyramid::build(const cv::Mat& image, int count) {
       PADE_DISPATCH(convert_row_u16, isa)(image.ptr<unsigned short>(y), levels[0].row(y), image.cols);
     }
   }
-  std::vector<float> scratch(static_cast<std::size_t>(padded(image.cols) + 2 * kRowMultiple));
+  AlignedFloats scratch(static_cast<std::size_t>(padded(image.cols) + 2 * kRowMultiple));
   for (std::size_t i = 1; i < levels.size(); ++i) {
     const PlaneView& finer = levels[i - 1].view();
     levels[i].resize((finer.width + 1) / 2, (finer.height + 1) / 2);

@@ -64,7 +64,7 @@ void PyramidFlow::load(const cv::Mat& image, int slot) {
   const auto floats =
       static_cast<std::size_t>(std::max({planes, scratch_floats(image.cols),
                                          PADE_DISPATCH(confidence_scratch, isa_)(kSigmaRadius, image.cols)}));
-  for (std::vector<float>& scratch : scratch_) {
+  for (AlignedFloats& scratch : scratch_) {
     if (scratch.size() < floats) scratch.assign(floats, 0.0F);
   }
   pyramids_[static_cast<std::size_t>(slot)].build(image, count_);

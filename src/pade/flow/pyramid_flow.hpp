@@ -61,7 +61,7 @@ class PyramidFlow : public FlowEstimator {
   FlowOptions options_;
   simd::InstructionSet isa_ = simd::best();
   WorkerPool workers_;
-  std::vector<std::vector<float>> scratch_;
+  std::vector<AlignedFloats> scratch_;
   std::array<Pyramid, 2> pyramids_;
   int count_ = 1;
   int newest_ = 0;

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "pade/flow/kernels/clg_kernels.hpp"
+#include "pade/flow/plane.hpp"
 
 namespace pade::flow {
 
@@ -22,7 +22,7 @@ class SplitPlane {
 
  private:
   SplitView view_;
-  std::vector<float> memory_;
+  AlignedFloats memory_;
 };
 
 }  // namespace pade::flow

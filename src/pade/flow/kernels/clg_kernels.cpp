@@ -37,67 +37,70 @@ void clg_tensor(const ClgLevel& level, int first, int last, float* scratch) {
   const int begin = first - level.radius < 0 ? 0 : first - level.radius;
   Lines<5> mean(level.mean, lines, begin - 2);
   Lines<3> difference(level.difference, lines + Lines<5>::floats(width), begin - 1);
-  windowed<6>(
-      first, last, width, level.first.height, level.taps, level.radius, scratch,
-      [&](int y, float* const* out) {
-        mean.advance(y + 2);
-        difference.advance(y + 1);
-        for (int x = 0; x < n; x += kLanes) {
-          const float* m = mean[y] + x;
-          const float* d = difference[y] + x;
-          const V gx = along_x(m);
-          const V gy = five_point(load(mean[y - 2] + x), load(mean[y - 1] + x), load(mean[y + 1] + x),
-                                  load(mean[y + 2] + x));
-          const V gt = load(d);
-          const V weight =
-              level.normalisation > 0 ? 1.0F / (gx * gx + gy * gy + level.normalisation) : set(1.0F);
-          V xx = weight * gx * gx;
-          V xy = weight * gx * gy;
-          V yy = weight * gy * gy;
-          V xt = weight * gx * gt;
-          V yt = weight * gy * gt;
-          V tt = weight * gt * gt;
-          if (level.gamma > 0) {
-            const V gxx = load(m + 1) - 2.0F * load(m) + load(m - 1);
-            const V gyy = load(mean[y + 1] + x) - 2.0F * load(m) + load(mean[y - 1] + x);
-            const V gxy = 0.25F * ((load(mean[y + 1] + x + 1) - load(mean[y + 1] + x - 1)) -
-                                   (load(mean[y - 1] + x + 1) - load(mean[y - 1] + x - 1)));
-            const V gxt = 0.5F * (load(d + 1) - load(d - 1));
-            const V gyt = 0.5F * (load(difference[y + 1] + x) - load(difference[y - 1] + x));
-            V wx = set(level.gamma);
-            V wy = set(level.gamma);
-            if (level.normalisation > 0) {
-              wx = level.gamma / (gxx * gxx + gxy * gxy + level.normalisation);
-              wy = level.gamma / (gxy * gxy + gyy * gyy + level.normalisation);
-            }
-            xx += wx * gxx * gxx + wy * gxy * gxy;
-            xy += wx * gxx * gxy + wy * gxy * gyy;
-            yy += wx * gxy * gxy + wy * gyy * gyy;
-            xt += wx * gxx * gxt + wy * gxy * gyt;
-            yt += wx * gxy * gxt + wy * gyy * gyt;
-            tt += wx * gxt * gxt + wy * gyt * gyt;
-          }
-          const V at_x = load(level.u0.row(y) + x) + (ramp() + static_cast<float>(x));
-          const V at_y = load(level.v0.row(y) + x) + static_cast<float>(y);
-          I seen = I(at_x >= 0.0F) & I(at_x <= right) & I(at_y >= 0.0F) & I(at_y <= bottom);
-          if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
-          store(out[0] + x, select(seen, xx, V{}));
-          store(out[1] + x, select(seen, xy, V{}));
-          store(out[2] + x, select(seen, yy, V{}));
-          store(out[3] + x, select(seen, xt, V{}));
-          store(out[4] + x, select(seen, yt, V{}));
-          store(out[5] + x, select(seen, tt, V{}));
-        }
-      },
-      [&](int y, float* const* line) {
-        const PlaneView* planes[6] = {&level.j11, &level.j12, &level.j22, &level.j13, &level.j23, &level.j33};
-        for (int c = 0; c < 6; ++c) {
-          float* to = planes[c]->row(y);
+  with_radius(level.radius, [&](auto radius) {
+    windowed<6>(
+        first, last, width, level.first.height, level.taps, radius, scratch,
+        [&](int y, float* const* out) {
+          mean.advance(y + 2);
+          difference.advance(y + 1);
           for (int x = 0; x < n; x += kLanes) {
-            store(to + x, convolve_horizontal(line[c] + x, level.taps, level.radius));
+            const float* m = mean[y] + x;
+            const float* d = difference[y] + x;
+            const V gx = along_x(m);
+            const V gy = five_point(load(mean[y - 2] + x), load(mean[y - 1] + x), load(mean[y + 1] + x),
+                                    load(mean[y + 2] + x));
+            const V gt = load(d);
+            const V weight =
+                level.normalisation > 0 ? 1.0F / (gx * gx + gy * gy + level.normalisation) : set(1.0F);
+            V xx = weight * gx * gx;
+            V xy = weight * gx * gy;
+            V yy = weight * gy * gy;
+            V xt = weight * gx * gt;
+            V yt = weight * gy * gt;
+            V tt = weight * gt * gt;
+            if (level.gamma > 0) {
+              const V gxx = load(m + 1) - 2.0F * load(m) + load(m - 1);
+              const V gyy = load(mean[y + 1] + x) - 2.0F * load(m) + load(mean[y - 1] + x);
+              const V gxy = 0.25F * ((load(mean[y + 1] + x + 1) - load(mean[y + 1] + x - 1)) -
+                                     (load(mean[y - 1] + x + 1) - load(mean[y - 1] + x - 1)));
+              const V gxt = 0.5F * (load(d + 1) - load(d - 1));
+              const V gyt = 0.5F * (load(difference[y + 1] + x) - load(difference[y - 1] + x));
+              V wx = set(level.gamma);
+              V wy = set(level.gamma);
+              if (level.normalisation > 0) {
+                wx = level.gamma / (gxx * gxx + gxy * gxy + level.normalisation);
+                wy = level.gamma / (gxy * gxy + gyy * gyy + level.normalisation);
+              }
+              xx += wx * gxx * gxx + wy * gxy * gxy;
+              xy += wx * gxx * gxy + wy * gxy * gyy;
+              yy += wx * gxy * gxy + wy * gyy * gyy;
+              xt += wx * gxx * gxt + wy * gxy * gyt;
+              yt += wx * gxy * gxt + wy * gyy * gyt;
+              tt += wx * gxt * gxt + wy * gyt * gyt;
+            }
+            const V at_x = load(level.u0.row(y) + x) + (ramp() + static_cast<float>(x));
+            const V at_y = load(level.v0.row(y) + x) + static_cast<float>(y);
+            I seen = I(at_x >= 0.0F) & I(at_x <= right) & I(at_y >= 0.0F) & I(at_y <= bottom);
+            if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
+            store(out[0] + x, select(seen, xx, V{}));
+            store(out[1] + x, select(seen, xy, V{}));
+            store(out[2] + x, select(seen, yy, V{}));
+            store(out[3] + x, select(seen, xt, V{}));
+            store(out[4] + x, select(seen, yt, V{}));
+            store(out[5] + x, select(seen, tt, V{}));
           }
-        }
-      });
+        },
+        [&](int y, float* const* line, const float* taps) {
+          const PlaneView* planes[6] = {&level.j11, &level.j12, &level.j22,
+                                        &level.j13, &level.j23, &level.j33};
+          for (int c = 0; c < 6; ++c) {
+            float* to = planes[c]->row(y);
+            for (int x = 0; x < n; x += kLanes) {
+              store(to + x, convolve_horizontal(line[c] + x, taps, radius));
+            }
+          }
+        });
+  });
 }
 
 namespace {

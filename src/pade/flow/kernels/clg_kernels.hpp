@@ -47,9 +47,10 @@ struct ClgLevel {
   float normalisation = 0;    ///< zeta^2 of the constraint normalisation; 0 = none
 };
 
-/// The rows that half-sweep j = 0, 1, ... visits: from first + j first_step to last + j last_step, within the image.
-/// All rows: {0, 0, height, 0}. Pieces whose borders retreat (steps 1 and -1) may run at once; what they leave around
-/// a border is {border, -1, border, 1}, to be run after both. Together they are the same sweeps, to the bit.
+/// The rows that half-sweep j = 0, 1, ... visits: from first + j first_step to last + j last_step, within the
+/// image. All rows: {0, 0, height, 0}. Pieces whose borders retreat (steps 1 and -1) may run at once; what
+/// they leave around a border is {border, -1, border, 1}, to be run after both. Together they are the same
+/// sweeps, to the bit.
 struct SweepRows {
   int first, first_step;
   int last, last_step;
@@ -58,8 +59,7 @@ struct SweepRows {
 PADE_DECLARE_KERNEL(void clg_warp(const ClgLevel& level, int first, int last))
 PADE_DECLARE_KERNEL(void clg_tensor(const ClgLevel& level, int first, int last, float* scratch))
 PADE_DECLARE_KERNEL(void clg_system(const ClgLevel& level, int first, int last, float* scratch))
-PADE_DECLARE_KERNEL(void clg_relax(const ClgSystem& system, int sweeps, float omega,
-                                   const SweepRows& rows))
+PADE_DECLARE_KERNEL(void clg_relax(const ClgSystem& system, int sweeps, float omega, const SweepRows& rows))
 PADE_DECLARE_KERNEL(void clg_split(PlaneView from, SplitView to, int first, int last))
 PADE_DECLARE_KERNEL(void clg_join(SplitView from, PlaneView to, int first, int last))
 PADE_DECLARE_KERNEL(long clg_scratch(int radius, int width))

@@ -89,20 +89,22 @@ void epipolar_lk_slope(const EpipolarLucasKanade& level, int first, int last, fl
 
 void epipolar_lk_prepare(const EpipolarLucasKanade& level, int first, int last, float* scratch) {
   const int n = padded(level.first.width);
-  windowed<1>(
-      first, last, level.first.width, level.first.height, level.taps, level.radius, scratch,
-      [&](int y, float* const* out) {
-        for (int x = 0; x < n; x += kLanes) {
-          const V a = load(level.slope.row(y) + x);
-          store(out[0] + x, a * a);
-        }
-      },
-      [&](int y, float* const* line) {
-        for (int x = 0; x < n; x += kLanes) {
-          store(level.inverse.row(y) + x,
-                1.0F / (convolve_horizontal(line[0] + x, level.taps, level.radius) + level.damping));
-        }
-      });
+  with_radius(level.radius, [&](auto radius) {
+    windowed<1>(
+        first, last, level.first.width, level.first.height, level.taps, radius, scratch,
+        [&](int y, float* const* out) {
+          for (int x = 0; x < n; x += kLanes) {
+            const V a = load(level.slope.row(y) + x);
+            store(out[0] + x, a * a);
+          }
+        },
+        [&](int y, float* const* line, const float* taps) {
+          for (int x = 0; x < n; x += kLanes) {
+            store(level.inverse.row(y) + x,
+                  1.0F / (convolve_horizontal(line[0] + x, taps, radius) + level.damping));
+          }
+        });
+  });
 }
 
 void epipolar_lk_iterate(const EpipolarLucasKanade& level, int first, int last, float* scratch) {
@@ -112,29 +114,31 @@ void epipolar_lk_iterate(const EpipolarLucasKanade& level, int first, int last, 
   const auto right = static_cast<float>(width - 1);
   const auto bottom = static_cast<float>(height - 1);
   const EpipolarLevel& e = level.line;
-  windowed<1>(
-      first, last, width, height, level.taps, level.radius, scratch,
-      [&](int y, float* const* out) {
-        for (int x = 0; x < n; x += kLanes) {
-          const V d = load(level.distance.row(y) + x);
-          const Target at(e, d, x, y);
-          const V inside_x = clamp(at.x, 0, right);
-          const V inside_y = clamp(at.y, 0, bottom);
-          const V difference = bilinear(level.second.data, level.second.stride, inside_x, inside_y) -
-                               load(level.first.row(y) + x);
-          const V seen = select(I(at.x == inside_x) & I(at.y == inside_y), difference, V{});
-          const V a = load(level.slope.row(y) + x);
-          store(out[0] + x, a * (a * d - seen));
-        }
-      },
-      [&](int y, float* const* line) {
-        for (int x = 0; x < n; x += kLanes) {
-          const V b = convolve_horizontal(line[0] + x, level.taps, level.radius) +
-                      level.damping * load(level.distance.row(y) + x);
-          store_step(level.distance.row(y) + x, level.next_distance.row(y) + x,
-                     load(level.inverse.row(y) + x) * b, level.largest_step);
-        }
-      });
+  with_radius(level.radius, [&](auto radius) {
+    windowed<1>(
+        first, last, width, height, level.taps, radius, scratch,
+        [&](int y, float* const* out) {
+          for (int x = 0; x < n; x += kLanes) {
+            const V d = load(level.distance.row(y) + x);
+            const Target at(e, d, x, y);
+            const V inside_x = clamp(at.x, 0, right);
+            const V inside_y = clamp(at.y, 0, bottom);
+            const V difference = bilinear(level.second.data, level.second.stride, inside_x, inside_y) -
+                                 load(level.first.row(y) + x);
+            const V seen = select(I(at.x == inside_x) & I(at.y == inside_y), difference, V{});
+            const V a = load(level.slope.row(y) + x);
+            store(out[0] + x, a * (a * d - seen));
+          }
+        },
+        [&](int y, float* const* line, const float* taps) {
+          for (int x = 0; x < n; x += kLanes) {
+            const V b = convolve_horizontal(line[0] + x, taps, radius) +
+                        level.damping * load(level.distance.row(y) + x);
+            store_step(level.distance.row(y) + x, level.next_distance.row(y) + x,
+                       load(level.inverse.row(y) + x) * b, level.largest_step);
+          }
+        });
+  });
 }
 
 void epipolar_clg_warp(const EpipolarClg& level, int first, int last) {
@@ -174,42 +178,45 @@ void epipolar_clg_tensor(const EpipolarClg& level, int first, int last, float* s
   const int begin = first - level.radius < 0 ? 0 : first - level.radius;
   Lines<5> mean(level.mean, lines, begin - 2);
   Lines<3> difference(level.difference, lines + Lines<5>::floats(width), begin - 1);
-  windowed<3>(
-      first, last, width, level.mean.height, level.taps, level.radius, scratch,
-      [&](int y, float* const* out) {
-        mean.advance(y + 2);
-        difference.advance(y + 1);
-        for (int x = 0; x < n; x += kLanes) {
-          const float* m = mean[y] + x;
-          const float* above = mean[y - 1] + x;
-          const float* below = mean[y + 1] + x;
-          const float* d = difference[y] + x;
-          const V ex = load(e.direction_x.row(y) + x);
-          const V ey = load(e.direction_y.row(y) + x);
-          const V a = along_x(m) * ex +
-                      five_point(load(mean[y - 2] + x), load(above), load(below), load(mean[y + 2] + x)) * ey;
-          const V gt = load(d);
-          // The derivatives of a, and those of the residual: constancy of the gradient.
-          const V gxy = 0.25F * ((load(below + 1) - load(below - 1)) - (load(above + 1) - load(above - 1)));
-          const V ax = (load(m + 1) - 2.0F * load(m) + load(m - 1)) * ex + gxy * ey;
-          const V ay = gxy * ex + (load(below) - 2.0F * load(m) + load(above)) * ey;
-          const V xt = 0.5F * (load(d + 1) - load(d - 1));
-          const V yt = 0.5F * (load(difference[y + 1] + x) - load(difference[y - 1] + x));
-          const Target at(e, load(level.distance0.row(y) + x), x, y);
-          const I seen = I(at.x >= 0.0F) & I(at.x <= right) & I(at.y >= 0.0F) & I(at.y <= bottom);
-          store(out[0] + x, select(seen, a * a + level.gamma * (ax * ax + ay * ay), V{}));
-          store(out[1] + x, select(seen, a * gt + level.gamma * (ax * xt + ay * yt), V{}));
-          store(out[2] + x, select(seen, gt * gt + level.gamma * (xt * xt + yt * yt), V{}));
-        }
-      },
-      [&](int y, float* const* line) {
-        const PlaneView* planes[3] = {&level.j11, &level.j13, &level.j33};
-        for (int c = 0; c < 3; ++c) {
+  with_radius(level.radius, [&](auto radius) {
+    windowed<3>(
+        first, last, width, level.mean.height, level.taps, radius, scratch,
+        [&](int y, float* const* out) {
+          mean.advance(y + 2);
+          difference.advance(y + 1);
           for (int x = 0; x < n; x += kLanes) {
-            store(planes[c]->row(y) + x, convolve_horizontal(line[c] + x, level.taps, level.radius));
+            const float* m = mean[y] + x;
+            const float* above = mean[y - 1] + x;
+            const float* below = mean[y + 1] + x;
+            const float* d = difference[y] + x;
+            const V ex = load(e.direction_x.row(y) + x);
+            const V ey = load(e.direction_y.row(y) + x);
+            const V a =
+                along_x(m) * ex +
+                five_point(load(mean[y - 2] + x), load(above), load(below), load(mean[y + 2] + x)) * ey;
+            const V gt = load(d);
+            // The derivatives of a, and those of the residual: constancy of the gradient.
+            const V gxy = 0.25F * ((load(below + 1) - load(below - 1)) - (load(above + 1) - load(above - 1)));
+            const V ax = (load(m + 1) - 2.0F * load(m) + load(m - 1)) * ex + gxy * ey;
+            const V ay = gxy * ex + (load(below) - 2.0F * load(m) + load(above)) * ey;
+            const V xt = 0.5F * (load(d + 1) - load(d - 1));
+            const V yt = 0.5F * (load(difference[y + 1] + x) - load(difference[y - 1] + x));
+            const Target at(e, load(level.distance0.row(y) + x), x, y);
+            const I seen = I(at.x >= 0.0F) & I(at.x <= right) & I(at.y >= 0.0F) & I(at.y <= bottom);
+            store(out[0] + x, select(seen, a * a + level.gamma * (ax * ax + ay * ay), V{}));
+            store(out[1] + x, select(seen, a * gt + level.gamma * (ax * xt + ay * yt), V{}));
+            store(out[2] + x, select(seen, gt * gt + level.gamma * (xt * xt + yt * yt), V{}));
           }
-        }
-      });
+        },
+        [&](int y, float* const* line, const float* taps) {
+          const PlaneView* planes[3] = {&level.j11, &level.j13, &level.j33};
+          for (int c = 0; c < 3; ++c) {
+            for (int x = 0; x < n; x += kLanes) {
+              store(planes[c]->row(y) + x, convolve_horizontal(line[c] + x, taps, radius));
+            }
+          }
+        });
+  });
 }
 
 namespace {

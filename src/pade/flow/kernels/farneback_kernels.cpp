@@ -79,57 +79,57 @@ void farneback_iterate(const FarnebackLevel& level, int first, int last, float* 
   const int n = padded(width);
   const auto right = static_cast<float>(width - 1);
   const auto bottom = static_cast<float>(height - 1);
-  windowed<5>(
-      first, last, width, height, level.taps, level.radius, scratch,
-      [&](int y, float* const* out) {
-        for (int x = 0; x < n; x += kLanes) {
-          const V here = ramp() + static_cast<float>(x);
-          const V target_x = here + round_to_whole(clamp(load(level.u.row(y) + x), -right, right));
-          const V target_y =
-              static_cast<float>(y) + round_to_whole(clamp(load(level.v.row(y) + x), -bottom, bottom));
-          const V at_x = clamp(target_x, 0, right);
-          const V at_y = clamp(target_y, 0, bottom);
-          I seen = I(at_x == target_x) & I(at_y == target_y);
-          if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
-          const I at = truncate(at_y) * stride + truncate(at_x);
-          const ExpansionView& to = level.second;
-          const float* const planes[5] = {to.axx.data, to.ayy.data, to.axy.data, to.bx.data, to.by.data};
-          V second[5];
-          fetch(planes, at, second);
-          const V du = at_x - here;
-          const V dv = at_y - static_cast<float>(y);
-          const V axx = 0.5F * (load(level.first.axx.row(y) + x) + second[0]);
-          const V ayy = 0.5F * (load(level.first.ayy.row(y) + x) + second[1]);
-          // Half of the mixed coefficient is the matrix's off-diagonal; another half averages the images.
-          const V axy = 0.25F * (load(level.first.axy.row(y) + x) + second[2]);
-          const V bx = 0.5F * (load(level.first.bx.row(y) + x) - second[3]) +
-                       axx * du + axy * dv;
-          const V by = 0.5F * (load(level.first.by.row(y) + x) - second[4]) +
-                       axy * du + ayy * dv;
-          // What leaves the image has no weight.
-          store(out[0] + x, select(seen, axx * axx + axy * axy, V{}));
-          store(out[1] + x, select(seen, axy * (axx + ayy), V{}));
-          store(out[2] + x, select(seen, ayy * ayy + axy * axy, V{}));
-          store(out[3] + x, select(seen, axx * bx + axy * by, V{}));
-          store(out[4] + x, select(seen, axy * bx + ayy * by, V{}));
-        }
-      },
-      [&](int y, float* const* line) {
-        for (int x = 0; x < n; x += kLanes) {
-          const V xx = convolve_horizontal(line[0] + x, level.taps, level.radius) + level.damping;
-          const V xy = convolve_horizontal(line[1] + x, level.taps, level.radius);
-          const V yy = convolve_horizontal(line[2] + x, level.taps, level.radius) + level.damping;
-          const V hx = convolve_horizontal(line[3] + x, level.taps, level.radius) +
-                       level.damping * load(level.u.row(y) + x);
-          const V hy = convolve_horizontal(line[4] + x, level.taps, level.radius) +
-                       level.damping * load(level.v.row(y) + x);
-          const V scale = 1.0F / max(xx * yy - xy * xy, set(level.damping * level.damping));
-          store_step(level.u.row(y) + x, level.next_u.row(y) + x, (yy * hx - xy * hy) * scale,
-                     level.largest_step);
-          store_step(level.v.row(y) + x, level.next_v.row(y) + x, (xx * hy - xy * hx) * scale,
-                     level.largest_step);
-        }
-      });
+  with_radius(level.radius, [&](auto radius) {
+    windowed<5>(
+        first, last, width, height, level.taps, radius, scratch,
+        [&](int y, float* const* out) {
+          for (int x = 0; x < n; x += kLanes) {
+            const V here = ramp() + static_cast<float>(x);
+            const V target_x = here + round_to_whole(clamp(load(level.u.row(y) + x), -right, right));
+            const V target_y =
+                static_cast<float>(y) + round_to_whole(clamp(load(level.v.row(y) + x), -bottom, bottom));
+            const V at_x = clamp(target_x, 0, right);
+            const V at_y = clamp(target_y, 0, bottom);
+            I seen = I(at_x == target_x) & I(at_y == target_y);
+            if (level.mask.data != nullptr) seen = seen & I(load(level.mask.row(y) + x) > 0.0F);
+            const I at = truncate(at_y) * stride + truncate(at_x);
+            const ExpansionView& to = level.second;
+            const float* const planes[5] = {to.axx.data, to.ayy.data, to.axy.data, to.bx.data, to.by.data};
+            V second[5];
+            fetch(planes, at, second);
+            const V du = at_x - here;
+            const V dv = at_y - static_cast<float>(y);
+            const V axx = 0.5F * (load(level.first.axx.row(y) + x) + second[0]);
+            const V ayy = 0.5F * (load(level.first.ayy.row(y) + x) + second[1]);
+            // Half of the mixed coefficient is the matrix's off-diagonal; another half averages the images.
+            const V axy = 0.25F * (load(level.first.axy.row(y) + x) + second[2]);
+            const V bx = 0.5F * (load(level.first.bx.row(y) + x) - second[3]) + axx * du + axy * dv;
+            const V by = 0.5F * (load(level.first.by.row(y) + x) - second[4]) + axy * du + ayy * dv;
+            // What leaves the image has no weight.
+            store(out[0] + x, select(seen, axx * axx + axy * axy, V{}));
+            store(out[1] + x, select(seen, axy * (axx + ayy), V{}));
+            store(out[2] + x, select(seen, ayy * ayy + axy * axy, V{}));
+            store(out[3] + x, select(seen, axx * bx + axy * by, V{}));
+            store(out[4] + x, select(seen, axy * bx + ayy * by, V{}));
+          }
+        },
+        [&](int y, float* const* line, const float* taps) {
+          for (int x = 0; x < n; x += kLanes) {
+            const V xx = convolve_horizontal(line[0] + x, taps, radius) + level.damping;
+            const V xy = convolve_horizontal(line[1] + x, taps, radius);
+            const V yy = convolve_horizontal(line[2] + x, taps, radius) + level.damping;
+            const V hx =
+                convolve_horizontal(line[3] + x, taps, radius) + level.damping * load(level.u.row(y) + x);
+            const V hy =
+                convolve_horizontal(line[4] + x, taps, radius) + level.damping * load(level.v.row(y) + x);
+            const V scale = 1.0F / max(xx * yy - xy * xy, set(level.damping * level.damping));
+            store_step(level.u.row(y) + x, level.next_u.row(y) + x, (yy * hx - xy * hy) * scale,
+                       level.largest_step);
+            store_step(level.v.row(y) + x, level.next_v.row(y) + x, (xx * hy - xy * hx) * scale,
+                       level.largest_step);
+          }
+        });
+  });
 }
 
 }  // namespace pade::flow::PADE_ISA

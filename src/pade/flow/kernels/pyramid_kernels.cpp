@@ -120,18 +120,23 @@ void upsample(PlaneView from, PlaneView to, float factor, int first, int last) {
   }
 }
 
-void smooth(PlaneView from, PlaneView to, const float* taps, int radius, int first, int last,
+void smooth(PlaneView from, PlaneView to, const float* taps, int any_radius, int first, int last,
             float* scratch) {
-  float* line = scratch + kRowMultiple;
-  const float* pointers[2 * kLargestSmoothRadius + 1];
-  for (int y = first; y < last; ++y) {
-    for (int i = -radius; i <= radius; ++i) pointers[i + radius] = from.row(clamp_index(y + i, from.height));
-    convolve_vertical(pointers + radius, taps, radius, line, padded(from.width));
-    repeat_edges(line, from.width, kLargestSmoothRadius);
-    for (int x = 0; x < padded(from.width); x += kLanes) {
-      store(to.row(y) + x, convolve_horizontal(line + x, taps, radius));
+  with_radius(any_radius, [&](auto radius) {
+    float* line = scratch + kRowMultiple;
+    float own_taps[kLargestSmoothRadius + 1];
+    for (int i = 0; i <= radius; ++i) own_taps[i] = taps[i];
+    const float* pointers[2 * kLargestSmoothRadius + 1];
+    for (int y = first; y < last; ++y) {
+      for (int i = -radius; i <= radius; ++i)
+        pointers[i + radius] = from.row(clamp_index(y + i, from.height));
+      convolve_vertical(pointers + radius, own_taps, radius, line, padded(from.width));
+      repeat_edges(line, from.width, kLargestSmoothRadius);
+      for (int x = 0; x < padded(from.width); x += kLanes) {
+        store(to.row(y) + x, convolve_horizontal(line + x, own_taps, radius));
+      }
     }
-  }
+  });
 }
 
 void subtract_from(PlaneView from, PlaneView to, int first, int last) {

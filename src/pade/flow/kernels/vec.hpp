@@ -106,8 +106,8 @@ PADE_INLINE bool all(I mask) {
 #endif
 }
 
-// out[i] = planes[i][at]. Flow is smooth: most indices count up by one from the first lane on, or jump once in
-// between, and plain loads take the place of slow gathers. Planes have a spare row behind their end.
+// out[i] = planes[i][at]. Flow is smooth: most indices count up by one from the first lane on, or jump once
+// in between, and plain loads take the place of slow gathers. Planes have a spare row behind their end.
 template <int kCount>
 PADE_INLINE void fetch(const float* const (&planes)[kCount], I at, V (&out)[kCount]) {
   const I start = at - truncate(ramp());
@@ -140,8 +140,32 @@ PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
   return top + ay * (bottom - top);
 }
 
+// A window's radius that the compiler knows, so that loops over taps unroll and taps stay in registers.
+template <int kValue>
+struct Fixed {
+  constexpr operator int() const { return kValue; }  // NOLINT(google-explicit-constructor): it is an int
+};
+
+// Calls work(radius) with the radii of the methods' own windows as constants, others as they are.
+template <class Work>
+PADE_INLINE void with_radius(int radius, const Work& work) {
+  switch (radius) {
+    case 1:
+      return work(Fixed<1>());
+    case 4:
+      return work(Fixed<4>());
+    case 5:
+      return work(Fixed<5>());
+    case 8:
+      return work(Fixed<8>());
+    default:
+      return work(radius);
+  }
+}
+
 // out = sum of taps[|i|] * rows[i], i = -radius to radius; `rows` points at the middle row's pointer.
-PADE_INLINE void convolve_vertical(const float* const* rows, const float* taps, int radius, float* out,
+template <class Radius>
+PADE_INLINE void convolve_vertical(const float* const* rows, const float* taps, Radius radius, float* out,
                                    int n) {
   constexpr int kBlock = 2;
   for (int x = 0; x < n; x += kBlock * kLanes) {
@@ -157,7 +181,8 @@ PADE_INLINE void convolve_vertical(const float* const* rows, const float* taps, 
 }
 
 // The value at x of a row convolved with symmetric taps; reads `radius` elements to both sides.
-PADE_INLINE V convolve_horizontal(const float* row, const float* taps, int radius) {
+template <class Radius>
+PADE_INLINE V convolve_horizontal(const float* row, const float* taps, Radius radius) {
   V sum = taps[0] * load(row);
   for (int i = 1; i <= radius; ++i) sum += taps[i] * (load(row - i) + load(row + i));
   return sum;

@@ -23,17 +23,20 @@ PADE_INLINE long window_scratch(int channels, int radius, int width) {
 }
 
 // For each row y in [first_row, last_row): `produce(y, out)` fills channels rows of products, each
-// padded(width) long; `consume(y, lines)` gets their vertical weighted sums over y - radius to y + radius.
-// Rows outside the image count as zero, and so do the `radius` elements before and behind each line, ready
-// for convolve_horizontal().
-template <int kChannels, class Produce, class Consume>
-PADE_INLINE void windowed(int first_row, int last_row, int width, int height, const float* taps, int radius,
-                          float* scratch, const Produce& produce, const Consume& consume) {
+// padded(width) long; `consume(y, lines, taps)` gets their vertical weighted sums over y - radius to y +
+// radius. Rows outside the image count as zero, and so do the `radius` elements before and behind each line,
+// ready for convolve_horizontal().
+template <int kChannels, class Radius, class Produce, class Consume>
+PADE_INLINE void windowed(int first_row, int last_row, int width, int height, const float* taps,
+                          Radius radius, float* scratch, const Produce& produce, const Consume& consume) {
   const int n = padded(width);
   const long line = n + 2 * kRowMultiple;
   const int rows = 2 * radius + 1;
   float* zero = scratch;
   for (long i = 0; i < line; ++i) zero[i] = 0;
+  // The compiler must not think that writing a sum could change a tap.
+  float own_taps[kMaxRadius + 1];
+  for (int i = 0; i <= radius; ++i) own_taps[i] = taps[i];
   float* sums[kChannels];
   float* ring[kChannels];
   for (int c = 0; c < kChannels; ++c) {
@@ -56,10 +59,10 @@ PADE_INLINE void windowed(int first_row, int last_row, int width, int height, co
       for (int i = -radius; i <= radius; ++i) {
         pointers[i + radius] = y + i >= 0 && y + i < height ? slot(c, y + i) : zero;
       }
-      convolve_vertical(pointers + radius, taps, radius, sums[c], n);
+      convolve_vertical(pointers + radius, own_taps, radius, sums[c], n);
       for (int x = width; x < n; ++x) sums[c][x] = 0;
     }
-    consume(y, sums);
+    consume(y, sums, own_taps);
   }
 }
 
