@@ -65,7 +65,7 @@ void window(benchmark::State& state) {
   const Plane from = noise();
   Plane to(kWidth, kHeight);
   const std::vector<float> taps = gaussian_taps(0.5 * radius, radius);
-  std::vector<float> scratch(4096);
+  AlignedFloats scratch(kPlaneLines * (kWidth + 2 * kRowMultiple));
   for (auto _ : state) {
     PADE_DISPATCH(smooth, pade::simd::best())
     (from.view(), to.view(), taps.data(), radius, 0, kHeight, scratch.data());
@@ -77,7 +77,7 @@ void window(benchmark::State& state) {
 void median(benchmark::State& state) {
   const Plane from = noise();
   Plane to(kWidth, kHeight);
-  std::vector<float> scratch(8192);
+  AlignedFloats scratch(kPlaneLines * (kWidth + 2 * kRowMultiple));
   for (auto _ : state) {
     PADE_DISPATCH(median5, pade::simd::best())(from.view(), to.view(), 0, kHeight, scratch.data());
     benchmark::DoNotOptimize(to.data());

@@ -55,7 +55,7 @@ class EpipolarPyramid : public EpipolarEstimator {
     const int count = pyramid_levels(first.size(), options_.smallest_level);
     first_.build(first, count);
     second_.build(second, count);
-    const long planes = 5 * (padded(first.cols) + 2L * kRowMultiple);
+    const long planes = kPlaneLines * (padded(first.cols) + 2L * kRowMultiple);
     scratch_.resize(static_cast<std::size_t>(
         std::max({planes, scratch_floats(first.cols),
                   PADE_DISPATCH(confidence_scratch, isa_)(kAcrossRadius, first.cols)})));

@@ -22,9 +22,6 @@ constexpr double kSigmaWindow = 2.5;
 constexpr int kSigmaRadius = 5;
 constexpr float kGreyNoise = 1.0F;
 
-// Lines that the kernels on single planes need at most (median of 5 x 5).
-constexpr int kPlaneLines = 5;
-
 }  // namespace
 
 PyramidFlow::PyramidFlow(const FlowOptions& options)

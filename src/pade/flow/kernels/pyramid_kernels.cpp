@@ -29,40 +29,70 @@ PADE_INLINE void sort5(V& a, V& b, V& c, V& d, V& e) {
   sort(b, c);
 }
 
-// The median of p[first] to p[last] by dropping the smallest and the largest until one is left. Templates, so
-// that every index is a constant and the values stay in registers.
-template <int kLow, int kHigh>
-PADE_INLINE void sort_ends(V* p) {
-  if constexpr (kLow < kHigh) {
-    sort(p[kLow], p[kHigh]);
-    sort_ends<kLow + 1, kHigh - 1>(p);
-  }
+// Batcher's odd-even merge of two sorted lists of two, three and five: the odd members and the even members
+// are merged, and one comparison of neighbours is left.
+PADE_INLINE void merge2(V a1, V a2, V b1, V b2, V* out) {
+  sort(a1, b1);
+  sort(a2, b2);
+  sort(b1, a2);
+  out[0] = a1;
+  out[1] = b1;
+  out[2] = a2;
+  out[3] = b2;
 }
-template <int kTo, int kFrom, int kLast>
-PADE_INLINE void smallest_to(V* p) {
-  if constexpr (kFrom <= kLast) {
-    sort(p[kTo], p[kFrom]);
-    smallest_to<kTo, kFrom + 1, kLast>(p);
-  }
+PADE_INLINE void merge3(V a1, V a2, V a3, V b1, V b2, V b3, V* out) {
+  V odd[4];
+  merge2(a1, a3, b1, b3, odd);
+  sort(a2, b2);
+  sort(a2, odd[1]);
+  sort(b2, odd[2]);
+  out[0] = odd[0];
+  out[1] = a2;
+  out[2] = odd[1];
+  out[3] = b2;
+  out[4] = odd[2];
+  out[5] = odd[3];
 }
-template <int kTo, int kFrom>
-PADE_INLINE void largest_to(V* p) {
-  if constexpr (kFrom < kTo) {
-    sort(p[kFrom], p[kTo]);
-    largest_to<kTo, kFrom + 1>(p);
+PADE_INLINE void merge5(const V* a, const V* b, V* out) {
+  V odd[6];
+  V even[4];
+  merge3(a[0], a[2], a[4], b[0], b[2], b[4], odd);
+  merge2(a[1], a[3], b[1], b[3], even);
+  out[0] = odd[0];
+  for (int i = 0; i < 4; ++i) {
+    sort(even[i], odd[i + 1]);
+    out[1 + 2 * i] = even[i];
+    out[2 + 2 * i] = odd[i + 1];
   }
+  out[9] = odd[5];
 }
-template <int kFirst, int kLast>
-PADE_INLINE V median_between(V* p) {
-  if constexpr (kFirst == kLast) {
-    return p[kFirst];
-  } else {
-    constexpr int kMiddle = (kFirst + kLast) / 2;
-    sort_ends<kFirst, kLast>(p);
-    smallest_to<kFirst, kFirst + 1, kMiddle>(p);
-    largest_to<kLast, kMiddle>(p);
-    return median_between<kFirst + 1, kLast - 1>(p);
+
+// The median of two sorted lists of ten and one of five. It has 12 of the 25 below it, up to 5 of them among
+// the five, so that it is one of the five or has rank 8 to 13 in the union of the tens. Comparing one list of
+// ten with the reverse of the other parts the ten smaller from the ten larger, each list rising and then
+// falling; comparing the halves of such a list parts it again. (Ranks count from one here, arrays from zero.)
+PADE_INLINE V median_of_10_10_5(const V* a, const V* b, const V* c) {
+  V low[10];
+  V high[10];
+  for (int i = 0; i < 10; ++i) {
+    low[i] = min(a[i], b[9 - i]);
+    high[i] = max(a[i], b[9 - i]);
   }
+  V top[5];     // ranks 6 to 10
+  V bottom[5];  // ranks 11 to 15
+  for (int i = 0; i < 5; ++i) {
+    top[i] = max(low[i], low[i + 5]);
+    bottom[i] = min(high[i], high[i + 5]);
+  }
+  sort5(top[0], top[1], top[2], top[3], top[4]);
+  sort5(bottom[0], bottom[1], bottom[2], bottom[3], bottom[4]);
+  // The sixth of the eleven: of some i of the first list and 6 - i of the second it is the largest.
+  const V with_all_five = max(top[2], c[4]);
+  const V with_four = max(top[3], c[3]);
+  const V with_three = max(top[4], c[2]);
+  const V with_two = max(bottom[0], c[1]);
+  const V with_one = max(bottom[1], c[0]);
+  return min(min(min(with_all_five, with_four), min(with_three, with_two)), min(with_one, bottom[2]));
 }
 
 }  // namespace
@@ -197,49 +227,43 @@ void median3(PlaneView from, PlaneView to, int first, int last, float* scratch) 
   }
 }
 
-// Columns of five are sorted once and shared by the five windows that hold them. Of the 25 values in sorted
-// rows and columns twelve cannot be the median; the last selection is among thirteen.
+// Columns of five are sorted once and merged with their right neighbours once; a window is two such pairs and
+// one more column.
 void median5(PlaneView from, PlaneView to, int first, int last, float* scratch) {
-  const long line = padded(from.width) + 2 * kRowMultiple;
+  const int n = padded(from.width);
+  const long line = n + 2 * kRowMultiple;
   float* sorted[5];
+  float* pairs[10];
   for (int i = 0; i < 5; ++i) sorted[i] = scratch + line * i + kRowMultiple;
+  for (int i = 0; i < 10; ++i) pairs[i] = scratch + line * (5 + i) + kRowMultiple;
   for (int y = first; y < last; ++y) {
     const float* rows[5];
     for (int i = 0; i < 5; ++i) rows[i] = from.row(clamp_index(y + i - 2, from.height));
-    for (int x = 0; x < padded(from.width); x += kLanes) {
+    for (int x = 0; x < n; x += kLanes) {
       V p[5] = {load(rows[0] + x), load(rows[1] + x), load(rows[2] + x), load(rows[3] + x),
                 load(rows[4] + x)};
       sort5(p[0], p[1], p[2], p[3], p[4]);
-      store(sorted[0] + x, p[0]);
-      store(sorted[1] + x, p[1]);
-      store(sorted[2] + x, p[2]);
-      store(sorted[3] + x, p[3]);
-      store(sorted[4] + x, p[4]);
+      for (int i = 0; i < 5; ++i) store(sorted[i] + x, p[i]);
     }
     for (float* row : sorted) repeat_edges(row, from.width, kLargestSmoothRadius);
-    for (int x = 0; x < padded(from.width); x += kLanes) {
-      // Rank i of the columns, sorted across the five columns: q[i][j] then has at least (i+1)(j+1)-1 of the
-      // 25 values below it and (5-i)(5-j)-1 above. The median has 12 on each side, which leaves 13
-      // candidates.
-      V q[5][5];
-      const auto sorted_ranks = [&](int i) {
-        const float* at = sorted[i] + x;
-        V* r = q[i];
-        r[0] = load(at - 2);
-        r[1] = load(at - 1);
-        r[2] = load(at);
-        r[3] = load(at + 1);
-        r[4] = load(at + 2);
-        sort5(r[0], r[1], r[2], r[3], r[4]);
-      };
-      sorted_ranks(0);
-      sorted_ranks(1);
-      sorted_ranks(2);
-      sorted_ranks(3);
-      sorted_ranks(4);
-      V band[13] = {q[0][3], q[0][4], q[1][2], q[1][3], q[1][4], q[2][1], q[2][2],
-                    q[2][3], q[3][0], q[3][1], q[3][2], q[4][0], q[4][1]};
-      store(to.row(y) + x, (median_between<0, 12>(band)));
+    // From two columns before the image on: what is computed before those is not used.
+    for (int x = -kLanes; x < n; x += kLanes) {
+      V here[5];
+      V next[5];
+      V both[10];
+      for (int i = 0; i < 5; ++i) here[i] = load(sorted[i] + x);
+      for (int i = 0; i < 5; ++i) next[i] = load(sorted[i] + x + 1);
+      merge5(here, next, both);
+      for (int i = 0; i < 10; ++i) store(pairs[i] + x, both[i]);
+    }
+    for (int x = 0; x < n; x += kLanes) {
+      V left[10];
+      V right[10];
+      V column[5];
+      for (int i = 0; i < 10; ++i) left[i] = load(pairs[i] + x - 2);
+      for (int i = 0; i < 10; ++i) right[i] = load(pairs[i] + x);
+      for (int i = 0; i < 5; ++i) column[i] = load(sorted[i] + x + 2);
+      store(to.row(y) + x, median_of_10_10_5(left, right, column));
     }
   }
 }

@@ -33,8 +33,11 @@ PADE_DECLARE_KERNEL(void subtract_from(PlaneView from, PlaneView to, int first, 
 PADE_DECLARE_KERNEL(void gradient(PlaneView from, PlaneView along_x, PlaneView along_y, int first, int last,
                                   float* scratch))
 
-/// Median of 3 x 3 or 5 x 5, edges repeated. Rows [first, last). `scratch`: size * (padded(width) + 2
-/// kRowMultiple) floats. `from` and `to` differ.
+/// Lines of padded(width) + 2 kRowMultiple floats that the kernels of this file need at most.
+inline constexpr int kPlaneLines = 15;
+
+/// Median of 3 x 3 or 5 x 5, edges repeated. Rows [first, last). `scratch`: kPlaneLines lines. `from` and
+/// `to` differ.
 PADE_DECLARE_KERNEL(void median3(PlaneView from, PlaneView to, int first, int last, float* scratch))
 PADE_DECLARE_KERNEL(void median5(PlaneView from, PlaneView to, int first, int last, float* scratch))
 
