@@ -58,10 +58,13 @@ Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, i
     cv::Mat truth =
         flow_from_depth(sequence.camera(), *depth, sequence.pose(frame), sequence.pose(frame + stride));
     truth.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), sequence.mask() == 0);
+    std::vector<cv::Mat> components;
+    cv::split(truth, components);
+    if (cv::countNonZero(components[0] == components[0]) == 0) continue;
     pairs.push_back({frame, grey(first->image), grey(second->image), std::move(truth)});
   }
   if (pairs.empty()) {
-    return Error{fmt::format("{}: no two frames {} apart with true depth", name, stride)};
+    return Error{fmt::format("{}: no two frames {} apart with true depth of what both see", name, stride)};
   }
   return pairs;
 }
