@@ -1,15 +1,16 @@
-// What the machine can do at best, and what the loops of the flow methods do: the floor that docs/flow.md compares
-// with. Items are vector lanes of arithmetic, or pixels.
+// What the machine can do at best, and what the loops of the flow methods do: the floor that docs/flow.md
+// compares with. Items are vector lanes of arithmetic, or pixels.
 #include <string>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 
-#include "floor_kernels.hpp"
 #include "pade/core/simd.hpp"
 #include "pade/flow/kernels/pyramid_kernels.hpp"
 #include "pade/flow/plane.hpp"
 #include "pade/flow/pyramid.hpp"
+
+#include "floor_kernels.hpp"
 
 namespace {
 

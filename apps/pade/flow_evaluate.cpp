@@ -215,7 +215,8 @@ void add_flow_evaluate(CLI::App& flow, Context& context) {
   CLI::App* command = flow.add_subcommand("evaluate", "Compares methods on image pairs with known flow.");
   auto arguments = std::make_shared<Arguments>();
   command->footer(
-      "A folder holds pairs as Middlebury and KITTI lay them out, or is a sequence with true depth and poses, "
+      "A folder holds pairs as Middlebury and KITTI lay them out, or is a sequence with true depth and "
+      "poses, "
       "from which\nthe flow of a static scene follows.\n\n"
       "  pade flow evaluate middlebury --flow clg-fast,dis-medium --repeat 9\n"
       "  pade flow evaluate flights/* --flow clg-fast,dis-medium --mean\n");

@@ -14,11 +14,11 @@ namespace pade {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::AllOf;
-using testing::HasSubstr;
 using test::kPade;
 using test::Outcome;
 using test::shell;
+using testing::AllOf;
+using testing::HasSubstr;
 
 /// The sample flight that ctest has made once for all tests (five frames), and a folder for what each test
 /// does to a copy of it.

@@ -14,10 +14,10 @@
 namespace pade {
 namespace {
 
-using testing::HasSubstr;
 using test::kPade;
 using test::Outcome;
 using test::shell;
+using testing::HasSubstr;
 
 TEST(FlowCommand, ComparesMethodsOnASequenceWhoseFlowFollowsFromDepthAndPoses) {
   const std::string flight = PADE_SAMPLE_FLIGHT;
@@ -30,7 +30,8 @@ TEST(FlowCommand, ComparesMethodsOnASequenceWhoseFlowFollowsFromDepthAndPoses) {
   EXPECT_EQ(methods.at("clg-fast").at("pairs").size(), 4U);
   EXPECT_EQ(mean.at("coverage"), 1);
   EXPECT_LT(mean.at("r3").get<double>(), 0.1);
-  EXPECT_LT(mean.at("aee_px").get<double>(), methods.at("dis-ultrafast").at("mean").at("aee_px").get<double>());
+  EXPECT_LT(mean.at("aee_px").get<double>(),
+            methods.at("dis-ultrafast").at("mean").at("aee_px").get<double>());
   const auto& confidence = mean.at("confidence");
   const auto remaining = confidence.at("aee_px_without_least_sure_percent").get<std::vector<double>>();
   const auto best = confidence.at("aee_px_without_worst_percent").get<std::vector<double>>();

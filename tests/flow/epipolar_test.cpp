@@ -125,14 +125,7 @@ TEST_P(EpipolarMethods, SurviveEverySizeAndUndefinedLines) {
 TEST_P(EpipolarMethods, SurviveImagesThatSayNothing) {
   auto method = make(FlowConfidence::local);
   const cv::Size size(75, 61);
-  cv::Mat noise(size, CV_8UC1);
-  cv::randu(noise, 0, 256);
-  cv::Mat stripes(size, CV_8UC1);
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) stripes.at<std::uint8_t>(y, x) = (x + y) % 2 == 0 ? 0 : 255;
-  }
-  const std::vector<cv::Mat> images = {cv::Mat(size, CV_8UC1, cv::Scalar(0)),
-                                       cv::Mat(size, CV_8UC1, cv::Scalar(255)), noise, stripes};
+  const std::vector<cv::Mat> images = testing::difficult_images(size);
   EpipolarField lines;
   lines.direction = cv::Mat(size, CV_32FC2, cv::Scalar(-0.8, 0.6));
   for (const cv::Mat& first : images) {
@@ -158,9 +151,8 @@ TEST_P(EpipolarMethods, DoNotDependOnStridesNorOnThePastNorOnTheDepthOfGreyValue
   auto method = make(FlowConfidence::local);
   const EpipolarFlow view = method->estimate(flight.first(part), flight.second(part), lines);
   method->estimate(flight.second, flight.first, flight.lines);
-  const EpipolarFlow copy =
-      method->estimate(flight.first(part).clone(), flight.second(part).clone(),
-                       {lines.base.clone(), lines.direction.clone()});
+  const EpipolarFlow copy = method->estimate(flight.first(part).clone(), flight.second(part).clone(),
+                                             {lines.base.clone(), lines.direction.clone()});
   EXPECT_EQ(cv::norm(view.distance, copy.distance, cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(view.flow.vectors, copy.flow.vectors, cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(view.across, copy.across, cv::NORM_INF), 0);
@@ -169,7 +161,8 @@ TEST_P(EpipolarMethods, DoNotDependOnStridesNorOnThePastNorOnTheDepthOfGreyValue
   flight.first(part).convertTo(first, CV_16U, 257);
   flight.second(part).convertTo(second, CV_16U, 257);
   const EpipolarFlow wide = method->estimate(first, second, lines);
-  EXPECT_LT(cv::norm(wide.distance, view.distance, cv::NORM_L1) / static_cast<double>(wide.distance.total()), 1e-3);
+  EXPECT_LT(cv::norm(wide.distance, view.distance, cv::NORM_L1) / static_cast<double>(wide.distance.total()),
+            1e-3);
 }
 
 TEST_P(EpipolarMethods, RefuseWhatDoesNotFitAndIgnoreAWildPrediction) {
@@ -187,7 +180,8 @@ TEST_P(EpipolarMethods, RefuseWhatDoesNotFitAndIgnoreAWildPrediction) {
   predicted.rowRange(20, 40) = std::numeric_limits<float>::infinity();
   predicted.rowRange(40, 50) = std::numeric_limits<float>::max();
   EXPECT_TRUE(cv::checkRange(method->estimate(pair.first, pair.second, lines, predicted).flow.vectors));
-  EXPECT_FALSE(method->estimate(pair.first, pair.second, lines, cv::Mat(3, 3, CV_32FC1, cv::Scalar(9))).empty());
+  EXPECT_FALSE(
+      method->estimate(pair.first, pair.second, lines, cv::Mat(3, 3, CV_32FC1, cv::Scalar(9))).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, EpipolarMethods, ::testing::Values("lucas-kanade", "clg-fast"),

@@ -124,19 +124,7 @@ TEST_P(OwnFlow, SurvivesEverySize) {
 
 TEST_P(OwnFlow, SurvivesImagesThatSayNothing) {
   auto method = make(GetParam());
-  const cv::Size size(75, 61);
-  cv::Mat noise(size, CV_8UC1);
-  cv::randu(noise, 0, 256);
-  cv::Mat stripes(size, CV_8UC1);
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) stripes.at<std::uint8_t>(y, x) = (x + y) % 2 == 0 ? 0 : 255;
-  }
-  cv::Mat diagonal(size, CV_8UC1);
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) diagonal.at<std::uint8_t>(y, x) = x + y > 60 ? 255 : 0;
-  }
-  const std::vector<cv::Mat> images = {cv::Mat(size, CV_8UC1, cv::Scalar(0)),
-                                       cv::Mat(size, CV_8UC1, cv::Scalar(255)), noise, stripes, diagonal};
+  const std::vector<cv::Mat> images = testing::difficult_images({75, 61});
   for (const cv::Mat& first : images) {
     for (const cv::Mat& second : images) {
       const FlowField field = method->estimate(first, second);
@@ -308,7 +296,8 @@ INSTANTIATE_TEST_SUITE_P(Methods, OwnFlow,
                          });
 
 TEST(OpenCvFlow, SurvivesEverySizeAndRefusesImagesThatDoNotFit) {
-  for (const std::string name : {"dis-ultrafast", "dis-fast", "dis-medium", "opencv-farneback", "opencv-pyrlk"}) {
+  for (const std::string name :
+       {"dis-ultrafast", "dis-fast", "dis-medium", "opencv-farneback", "opencv-pyrlk"}) {
     auto method = make(name);
     for (const cv::Size size :
          {cv::Size(1, 1), cv::Size(37, 1), cv::Size(1, 37), cv::Size(11, 9), cv::Size(65, 47)}) {

@@ -67,4 +67,21 @@ inline ShiftedPair shifted_pair(cv::Size size, cv::Point2d shift, unsigned seed 
           render(size, waves, [&](double x, double y) { return cv::Point2d(x, y) - shift; })};
 }
 
+/// Black, white, noise, a checkerboard and one straight edge: images that say nothing, too much, or half of
+/// it.
+inline std::vector<cv::Mat> difficult_images(cv::Size size) {
+  cv::Mat noise(size, CV_8UC1);
+  cv::randu(noise, 0, 256);
+  cv::Mat checkerboard(size, CV_8UC1);
+  cv::Mat edge(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      checkerboard.at<std::uint8_t>(y, x) = (x + y) % 2 == 0 ? 0 : 255;
+      edge.at<std::uint8_t>(y, x) = x + y > size.height ? 255 : 0;
+    }
+  }
+  return {cv::Mat(size, CV_8UC1, cv::Scalar(0)), cv::Mat(size, CV_8UC1, cv::Scalar(255)), noise, checkerboard,
+          edge};
+}
+
 }  // namespace pade::flow::testing

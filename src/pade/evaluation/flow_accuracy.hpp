@@ -26,14 +26,15 @@ struct FlowAccuracy {
 /// @param estimate, truth  CV_32FC2 of one size, pixels, NaN = unknown (truth beyond 1e9 is unknown too).
 FlowAccuracy flow_accuracy(const cv::Mat& estimate, const cv::Mat& truth);
 
-/// A pixel with a larger standard deviation counts as flagged, pixels: the error that makes a pixel wrong, 3 px, is
-/// five of it. One threshold for all methods.
+/// A pixel with a larger standard deviation counts as flagged, pixels: the error that makes a pixel wrong, 3
+/// px, is five of it. One threshold for all methods.
 inline constexpr float kDoubtfulSigma = 0.6F;
 
 /// Whether a flow's standard deviations know where it is wrong.
 struct FlowConfidenceAccuracy {
   double kept_endpoint_error = 0;  ///< AEE of the 70 % of compared pixels with the smallest sigma, pixels
-  double flagged = 0;  ///< of the pixels more than 3 px off, the share with sigma > kDoubtfulSigma; NaN where none
+  double flagged =
+      0;  ///< of the pixels more than 3 px off, the share with sigma > kDoubtfulSigma; NaN where none
   double trusted = 0;  ///< of the others, the share with sigma <= kDoubtfulSigma
   double within = 0;   ///< share of the components of all errors within one sigma; 68 % for Gaussian errors
   /// Sparsification: AEE of the pixels that remain without the least sure i %, for i = 0, 5, ... 95.

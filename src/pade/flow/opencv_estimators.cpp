@@ -9,8 +9,8 @@
 namespace pade::flow {
 namespace {
 
-// OpenCV raises exceptions for what it cannot do, such as DIS on very small images. Here images that do not fit
-// give an empty field, and where the method fails no vector is known.
+// OpenCV raises exceptions for what it cannot do, such as DIS on very small images. Here images that do not
+// fit give an empty field, and where the method fails no vector is known.
 template <class Work>
 FlowField guarded(const cv::Mat& first, const cv::Mat& second, const Work& work) {
   if (first.empty() || first.size() != second.size()) return {};

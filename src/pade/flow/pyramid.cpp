@@ -59,7 +59,8 @@ double effective_window(const std::vector<float>& taps) {
   for (std::size_t i = 0; i < taps.size(); ++i) {
     squares += (i == 0 ? 1.0 : 2.0) * static_cast<double>(taps[i]) * static_cast<double>(taps[i]);
   }
-  return kIndependent / (squares * squares);  // the two-dimensional sum is the square of the one-dimensional one
+  return kIndependent /
+         (squares * squares);  // the two-dimensional sum is the square of the one-dimensional one
 }
 
 void FlowPlanes::resize(int width, int height) {

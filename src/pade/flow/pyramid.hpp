@@ -29,8 +29,8 @@ std::vector<float> gaussian_taps(double sigma, int radius);
 std::vector<float> local_mean_taps(double sigma);
 
 /// Number of independent residuals in the separable window of these taps: half of 1 / sum of squared weights,
-/// for what is left after a warp (interpolation, edges, occlusion) is alike in neighbouring pixels. With the half
-/// about 68 % of Middlebury's errors lie within one standard deviation.
+/// for what is left after a warp (interpolation, edges, occlusion) is alike in neighbouring pixels. With the
+/// half about 68 % of Middlebury's errors lie within one standard deviation.
 double effective_window(const std::vector<float>& taps);
 
 /// The flow of one level.
@@ -41,8 +41,8 @@ struct FlowPlanes {
   void resize(int width, int height);
 };
 
-/// Splits CV_32FC2 of the full size into `flow` at 1 / 2^level of it, averaging blocks; NaN, and what leaves any
-/// image of this size, counts as zero.
+/// Splits CV_32FC2 of the full size into `flow` at 1 / 2^level of it, averaging blocks; NaN, and what leaves
+/// any image of this size, counts as zero.
 void load_flow(const cv::Mat& vectors, int level, FlowPlanes& flow);
 /// Interleaves into CV_32FC2.
 cv::Mat to_vectors(const FlowPlanes& flow);

@@ -42,7 +42,8 @@ class PyramidFlow : public FlowEstimator {
   [[nodiscard]] int finest_level() const { return options_.half_resolution && count_ > 1 ? 1 : 0; }
   [[nodiscard]] simd::InstructionSet isa() const { return isa_; }
 
-  /// Runs work(first, last, scratch) over strips of rows that cover the plane, each of `smallest` rows at least.
+  /// Runs work(first, last, scratch) over strips of rows that cover the plane, each of `smallest` rows at
+  /// least.
   void over_rows(const PlaneView& plane, const std::function<void(int, int, float*)>& work,
                  int smallest = kSmallestStrip);
   /// The first rows of those strips but that of the first one.

@@ -8,8 +8,8 @@
 
 namespace pade::flow {
 
-/// `threads` - 1 helpers beside the calling thread. One pair of images is some hundred short rounds of work, so
-/// whoever waits for the next one looks for a while before he sleeps.
+/// `threads` - 1 helpers beside the calling thread. One pair of images is some hundred short rounds of work,
+/// so whoever waits for the next one looks for a while before he sleeps.
 class WorkerPool {
  public:
   explicit WorkerPool(int threads) {
