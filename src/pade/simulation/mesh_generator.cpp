@@ -1,5 +1,6 @@
 #include "pade/simulation/mesh_generator.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
@@ -54,6 +55,19 @@ void tube(ObjText& out, const std::vector<Eigen::Vector3d>& path, double from_ra
   }
 }
 
+/// The surface between rings of equally many corners; the first and the last ring are one corner each.
+void close_rings(ObjText& out, const std::vector<std::vector<int>>& rings) {
+  for (std::size_t i = 0; i + 1 < rings.size(); ++i) {
+    for (std::size_t k = 0; k < std::max(rings[i].size(), rings[i + 1].size()); ++k) {
+      const auto at = [&](std::size_t ring, std::size_t index) {
+        return rings[ring][index % rings[ring].size()];
+      };
+      if (i + 2 < rings.size()) out.triangle(at(i, k), at(i + 1, k), at(i + 1, k + 1));
+      if (i > 0) out.triangle(at(i, k), at(i + 1, k + 1), at(i, k + 1));
+    }
+  }
+}
+
 /// A rhombic leaf about a point.
 void leaf(ObjText& out, const Eigen::Vector3d& at, double length, Random& random) {
   Eigen::Vector3d along = random.normal3().normalized();
@@ -68,13 +82,33 @@ void leaf(ObjText& out, const Eigen::Vector3d& at, double length, Random& random
   out.triangle(root, tip, right);
 }
 
+/// A ball of foliage, flattened and ragged.
+void tuft(ObjText& out, const Eigen::Vector3d& at, double radius, Random& random) {
+  constexpr int kRings = 5;
+  constexpr int kAround = 8;
+  std::vector<std::vector<int>> rings;
+  for (int i = 0; i <= kRings; ++i) {
+    const double polar = std::numbers::pi * i / kRings;
+    std::vector<int> ring;
+    const int count = (i == 0 || i == kRings) ? 1 : kAround;
+    for (int k = 0; k < count; ++k) {
+      const double azimuth = 2 * std::numbers::pi * (k + 0.5 * (i % 2)) / kAround;
+      const Eigen::Vector3d direction(std::sin(polar) * std::cos(azimuth),
+                                      std::sin(polar) * std::sin(azimuth), 0.75 * std::cos(polar));
+      ring.push_back(out.vertex(at + radius * random.uniform(0.75, 1.25) * direction));
+    }
+    rings.push_back(ring);
+  }
+  close_rings(out, rings);
+}
+
 }  // namespace
 
-TreeMeshes grow_tree(Random& random) {
+TreeMeshes grow_tree(const TreeShape& shape, Random& random) {
   ObjText wood;
   ObjText leaves;
-  const double height = random.uniform(5.0, 6.5);
-  const double radius = random.uniform(0.14, 0.2);
+  const double height = shape.height * random.uniform(0.88, 1.12);
+  const double radius = shape.trunk_radius * random.uniform(0.82, 1.18);
   std::vector<Eigen::Vector3d> trunk = {{0, 0, -0.3}};
   constexpr int kSteps = 6;
   for (int i = 1; i <= kSteps; ++i) {
@@ -84,7 +118,7 @@ TreeMeshes grow_tree(Random& random) {
   tube(wood, trunk, 1.15 * radius, 0.25 * radius, 10);
   const int branches = 11 + static_cast<int>(4 * random.uniform());
   for (int b = 0; b < branches; ++b) {
-    const double share = 0.38 + 0.6 * (b + random.uniform()) / branches;
+    const double share = shape.crown_base + (0.98 - shape.crown_base) * (b + random.uniform()) / branches;
     const auto below = static_cast<std::size_t>(share * kSteps);
     const double between = share * kSteps - static_cast<double>(below);
     const Eigen::Vector3d root =
@@ -99,11 +133,16 @@ TreeMeshes grow_tree(Random& random) {
                      0.07 * random.normal3());
     }
     tube(wood, path, 0.35 * radius, 0.06 * radius, 6);
-    for (int i = 0; i < 46; ++i) {
-      const double along = random.uniform(0.35, 1.0) * 4;
+    // Dense foliage about the outer half of the branch, and loose leaves where it thins out.
+    for (const std::size_t k : {2, 4}) {
+      const double size = (k == 2 ? 0.24 : 0.33) * length * random.uniform(0.85, 1.15);
+      tuft(leaves, path[k] + 0.05 * length * random.normal3(), size, random);
+    }
+    for (int i = 0; i < 26; ++i) {
+      const double along = random.uniform(0.4, 1.0) * 4;
       const auto k = std::min<std::size_t>(static_cast<std::size_t>(along), 3);
       const Eigen::Vector3d at = path[k] + (along - static_cast<double>(k)) * (path[k + 1] - path[k]);
-      leaf(leaves, at + 0.28 * random.normal3(), random.uniform(0.16, 0.3), random);
+      leaf(leaves, at + 0.2 * length * random.normal3(), random.uniform(0.14, 0.26), random);
     }
   }
   return {wood.str(), leaves.str()};
@@ -137,15 +176,7 @@ std::string break_stone(Random& random) {
     }
     rings.push_back(ring);
   }
-  for (std::size_t i = 0; i < kRings; ++i) {
-    for (std::size_t k = 0; k < kAround; ++k) {
-      const auto at = [&](std::size_t ring, std::size_t index) {
-        return rings[ring][index % rings[ring].size()];
-      };
-      if (i + 1 < kRings) out.triangle(at(i, k), at(i + 1, k), at(i + 1, k + 1));
-      if (i > 0) out.triangle(at(i, k), at(i + 1, k + 1), at(i, k + 1));
-    }
-  }
+  close_rings(out, rings);
   return out.str();
 }
 

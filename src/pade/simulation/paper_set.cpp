@@ -27,13 +27,29 @@ std::vector<Waypoint> straight(const Vector3d& start, const Vector3d& direction,
   return points;
 }
 
-/// Left and right around trunks that stand every five metres on the x axis.
+/// Left and right around trunks that stand every seven metres on the x axis.
 std::vector<Waypoint> around_the_trunks() {
   std::vector<Waypoint> points;
-  constexpr double kBeside = 1.15;
-  for (int i = -1; i < 8; ++i) {
+  constexpr double kBeside = 0.75;
+  for (int i = -1; i < 6; ++i) {
     const double side = i % 2 == 0 ? 1 : -1;
-    points.push_back({{5.0 * i - 1.5, kBeside * side, 1.7}, 0, {}});
+    points.push_back({{7.0 * i, kBeside * side, 1.7}, 0, {}});
+  }
+  return points;
+}
+
+/// About a vertical axis at `centre`, looking outward: 2 degrees and 2.8 cm per frame, `climb` m/s.
+std::vector<Waypoint> pirouette(const Vector3d& centre, int frames, double yaw_at_start, double climb) {
+  constexpr double kTurn = 20 * kDegree;  // per second
+  constexpr double kRadius = 0.28 / kTurn;
+  const double duration = (frames - 1) / kFrameRate;
+  std::vector<Waypoint> points;
+  constexpr int kPoints = 25;
+  for (int i = 0; i < kPoints; ++i) {
+    const double t = -kLead + (kLead + duration + 0.05) * i / (kPoints - 1);
+    const double yaw = yaw_at_start + t * kTurn;
+    points.push_back(
+        {centre + Vector3d(kRadius * std::cos(yaw), kRadius * std::sin(yaw), climb * t), yaw, kLead + t});
   }
   return points;
 }
@@ -67,11 +83,11 @@ std::vector<PaperSequence> all_sequences() {
   yawing.flight.trajectory.yaw = {16 * kDegree, 6, 0};
   set.push_back(std::move(yawing));
   auto pitching =
-      sequence("forward-pitch", WorldKind::rubble, kLong, straight({0, 0, 1.6}, east, kLong, kSpeed, 0, 0));
+      sequence("forward-pitch", WorldKind::rubble, kLong, straight({0, 0, 2.1}, east, kLong, kSpeed, 0, 0));
   pitching.flight.trajectory.pitch = {8 * kDegree, 4.5, 0};
   set.push_back(std::move(pitching));
   auto rolling = sequence("forward-roll", WorldKind::corridor, kLong,
-                          straight({-7, 0.45, 1.35}, east, kLong, kSpeed, 0, 0));
+                          straight({-7, 0.4, 1.6}, east, kLong, kSpeed, 0, 0));
   rolling.flight.trajectory.roll = {15 * kDegree, 5, 0};
   set.push_back(std::move(rolling));
   auto diagonal = sequence("diagonal", WorldKind::building, kLong,
@@ -85,10 +101,7 @@ std::vector<PaperSequence> all_sequences() {
   auto slalom = sequence("slalom", WorldKind::forest, kShort, around_the_trunks());
   slalom.flight.trajectory.heading = Heading::path;
   set.push_back(std::move(slalom));
-  // 2 degrees and 2.8 cm per frame.
-  auto turning = sequence("rotation", WorldKind::rubble, kShort,
-                          straight({14, -0.2, 1.7}, {1, 0.12, 0.05}, kShort, 0.28, 0.3, 20 * kDegree));
-  set.push_back(std::move(turning));
+  set.push_back(sequence("rotation", WorldKind::rubble, kShort, pirouette({14, 0, 1.7}, kShort, -0.5, 0.01)));
   return set;
 }
 
@@ -98,8 +111,14 @@ std::vector<PaperSequence> paper_sequences(std::uint64_t seed, bool quick) {
   std::vector<PaperSequence> set = all_sequences();
   for (std::size_t i = 0; i < set.size(); ++i) {
     set[i].world_seed = seed * 100 + i;
-    // A tenth of the frames, one after the other, so that the motion from frame to frame is the same.
-    if (quick) set[i].flight.frames = (set[i].flight.frames + 5) / 10;
+    if (quick) {
+      // A tenth of the frames, from the middle of the flight, one after the other: the motion from frame to
+      // frame is the same.
+      Flight& flight = set[i].flight;
+      const int fewer = (flight.frames + 5) / 10;
+      flight.first_frame += (flight.frames - fewer) / 2 / flight.frame_rate;
+      flight.frames = fewer;
+    }
   }
   return set;
 }

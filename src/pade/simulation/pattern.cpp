@@ -116,7 +116,7 @@ PatternTile plaster() {
   const cv::Mat stains = draw_noise(kPixels, 3, 3, 4, 0.5F, 1);
   const cv::Mat grain = draw_noise(kPixels, 32, 32, 5, 0.85F, 2);  // trowel marks and sand
   return paint(4, [&](int x, int y) {
-    const float tone = 1 + 0.09F * at(stains, x, y) + 0.13F * at(grain, x, y);
+    const float tone = 1 + 0.20F * at(stains, x, y) + 0.28F * at(grain, x, y);
     return tone * Colour(0.68F, 0.64F, 0.56F);
   });
 }
@@ -170,7 +170,7 @@ PatternTile concrete() {
   return paint(4, [&](int x, int y) {
     const bool seam = x % (kPixels / 2) < 2 || y % (kPixels / 4) < 2;  // formwork: 2 m x 1 m
     const float pit = random_at(x / 3, y / 3, 14) > 0.9985F ? 0.6F : 1;
-    const float tone = (1 + 0.16F * at(stains, x, y) + 0.17F * at(grain, x, y)) * (seam ? 0.75F : 1) * pit;
+    const float tone = (1 + 0.26F * at(stains, x, y) + 0.32F * at(grain, x, y)) * (seam ? 0.75F : 1) * pit;
     return tone * Colour(0.44F, 0.43F, 0.41F);
   });
 }
@@ -198,17 +198,48 @@ PatternTile asphalt() {
   });
 }
 
+/// The leaf that lies on top at a point, of those scattered one per cell: long, turned and overlapping.
+struct Leaf {
+  float across = 0;  ///< -1 to 1 from edge to edge
+  float tone = 0;
+  float yellow = 0;
+};
+
+Leaf topmost_leaf(float u, float v, int cells, std::uint32_t seed) {
+  Leaf leaf{0, 0.25F, 0};  // the dark between leaves
+  float highest = -1;
+  const int cu = static_cast<int>(u);
+  const int cv = static_cast<int>(v);
+  for (int dv = -1; dv <= 1; ++dv) {
+    for (int du = -1; du <= 1; ++du) {
+      const int column = (cu + du + cells) % cells;
+      const int row = (cv + dv + cells) % cells;
+      const float height = random_at(column, row, seed + 2);
+      if (height < highest) continue;
+      const float x = static_cast<float>(cu + du) + random_at(column, row, seed) - u;
+      const float y = static_cast<float>(cv + dv) + random_at(column, row, seed + 1) - v;
+      const float angle = 6.2831853F * random_at(column, row, seed + 3);
+      const float along = (std::cos(angle) * x + std::sin(angle) * y) / 1.05F;
+      const float across = (std::cos(angle) * y - std::sin(angle) * x) / 0.52F;
+      const float width = 1 - along * along;  // pointed at both ends
+      if (width <= 0 || std::abs(across) > width) continue;
+      highest = height;
+      leaf = {across / width, 0.45F + 0.95F * height, random_at(column, row, seed + 4)};
+    }
+  }
+  return leaf;
+}
+
 PatternTile leaves() {
   constexpr int kCells = 24;  // 4 cm
   const cv::Mat shade = draw_noise(kPixels, 4, 4, 5, 0.6F, 22);
   return paint(1, [&](int x, int y) {
     const float scale = static_cast<float>(kCells) / kPixels;
-    const Stone leaf = nearest_stone((static_cast<float>(x) + 0.5F) * scale,
-                                     (static_cast<float>(y) + 0.5F) * scale, kCells, 23);
-    const float tone =
-        (0.5F + 0.9F * random_at(leaf.column, leaf.row, 25)) * std::min(1.0F, 0.4F + 2 * leaf.gap);
-    const float yellow = random_at(leaf.column, leaf.row, 26);
-    return (tone * (1 + 0.3F * at(shade, x, y))) * Colour(0.08F + 0.09F * yellow, 0.19F, 0.05F);
+    const Leaf leaf = topmost_leaf((static_cast<float>(x) + 0.5F) * scale,
+                                   (static_cast<float>(y) + 0.5F) * scale, kCells, 23);
+    const float rib = std::abs(leaf.across) < 0.08F ? 1.25F : 1 + 0.2F * leaf.across;
+    return (leaf.tone * rib * (1 + 0.3F * at(shade, x, y))) *
+           Colour(0.08F + 0.09F * leaf.yellow, 0.19F, 0.05F);
   });
 }
 

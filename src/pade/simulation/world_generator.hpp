@@ -18,11 +18,11 @@ enum class WorldKind { building, street, forest, rubble, corridor };
 /// The same files for the same seed, on every machine. Each kind keeps its flight lane free for every seed:
 /// - building: a house with a tower on a lawn (the paper's Figure 4), facades at x = 26 m and 27 m; free
 /// along y = 3 m,
-///   before the lamps at x = 20.9 m, and along the line from (4, 16.5) to (18, 2)
+///   before the lamps at x = 22.9 m, and along the line from (4, 16.5) to (18, 2)
 /// - street: a road along x between houses; free within 1.6 m of the centre line
-/// - forest: trees about a row of trunks on the x axis, 5 m apart, to be flown around
-/// - rubble: a half-collapsed hall along x with thin poles and wires; free within 0.6 m of (y = 0, z = 1.6 m)
-/// - corridor: 3 m wide and 2.8 m high along x, windows on the left; free within 0.75 m of the centre line
+/// - forest: trees about a row of trunks on the x axis, 7 m apart, to be flown around
+/// - rubble: a half-collapsed hall along x with thin poles and wires; free within 0.9 m of y = 0 from 1.2 m to 2.6 m
+/// - corridor: 4.4 m wide and 3.3 m high along x, windows on the left; free within 0.75 m of the centre line
 WorldFiles generate_world(WorldKind kind, std::uint64_t seed);
 
 /// Writes the world file and its meshes (into meshes/ beside it). Existing files are replaced.
