@@ -140,6 +140,10 @@ void Builder::quadric(Quadric::Kind kind, const Eigen::Vector3d& centre, const E
   out_.patch_of_quadric.push_back(static_cast<std::int32_t>(out_.patches.size()));
   out_.patches.push_back(patch);
   out_.quadrics.push_back(Quadric::make(kind, visual_.T_world_shape, centre, half_extent));
+  const int pieces = out_.quadrics.back().pieces();
+  const auto quadric_index = static_cast<std::uint32_t>(out_.quadrics.size() - 1);
+  for (int i = 0; i < pieces; ++i)
+    out_.quadric_pieces.push_back({quadric_index, 2.0 * i / pieces - 1, 2.0 * (i + 1) / pieces - 1});
   out_.visual_of_quadric.push_back(static_cast<std::int32_t>(index_));
   out_.quadric_casts_shadow.push_back(visual_.casts_shadow);
 }

@@ -55,6 +55,13 @@ struct Geometry {
   std::vector<std::uint32_t> facet_of_triangle;
   std::vector<Facet> facets;
   std::vector<Quadric> quadrics;
+  /// What the tree of boxes holds of the quadrics: lengths of them, between two heights along the axis.
+  struct QuadricPiece {
+    std::uint32_t quadric;
+    double from;
+    double to;
+  };
+  std::vector<QuadricPiece> quadric_pieces;
   std::vector<std::int32_t> visual_of_quadric;
   std::vector<bool> quadric_casts_shadow;
   std::vector<std::int32_t> patch_of_quadric;

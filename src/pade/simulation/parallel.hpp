@@ -2,26 +2,25 @@
 // show.
 #pragma once
 
-#include <algorithm>
 #include <atomic>
 #include <thread>
 #include <vector>
 
 namespace pade::simulation {
 
-/// Calls work(row) for every row in [0, rows), in blocks that the threads take as they come free.
+/// Calls work(row) for every row in [0, rows); the threads take rows as they come free.
 template <class Work>
 void parallel_rows(int rows, int threads, const Work& work) {
-  constexpr int kBlock = 8;
   std::atomic<int> next = 0;
   const auto run = [&] {
-    for (int first = next.fetch_add(kBlock); first < rows; first = next.fetch_add(kBlock)) {
-      for (int row = first; row < std::min(first + kBlock, rows); ++row) work(row);
-    }
+    for (int row = next.fetch_add(1); row < rows; row = next.fetch_add(1)) work(row);
   };
   std::vector<std::jthread> helpers;
   for (int i = 1; i < threads; ++i) helpers.emplace_back(run);
   run();
 }
+
+/// Rows of tiles of `side` pixels that cover `pixels` rows.
+constexpr int tile_rows(int pixels, int side) { return (pixels + side - 1) / side; }
 
 }  // namespace pade::simulation

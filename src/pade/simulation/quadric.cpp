@@ -1,5 +1,6 @@
 #include "pade/simulation/quadric.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace pade::simulation {
@@ -57,16 +58,31 @@ Eigen::Vector3d Quadric::normal(const Eigen::Vector3d& unit_point, Part part) co
   return (T_unit_world.linear().transpose() * n).normalized();
 }
 
-Eigen::AlignedBox3d Quadric::bounds() const {
+Eigen::AlignedBox3d Quadric::bounds(double from, double to) const {
   // The half extent of an ellipsoid along a world axis is the norm of that row; of a cylinder, disc plus
   // axis.
   const Eigen::Matrix3d m = T_world_unit.linear();
   Eigen::Vector3d half;
   for (int i = 0; i < 3; ++i) {
-    half[i] = kind == Kind::sphere ? m.row(i).norm() : m.row(i).head<2>().norm() + std::abs(m(i, 2));
+    half[i] = kind == Kind::sphere ? m.row(i).norm()
+                                   : m.row(i).head<2>().norm() + 0.5 * (to - from) * std::abs(m(i, 2));
   }
-  const Eigen::Vector3d centre = T_world_unit.translation();
+  Eigen::Vector3d centre = T_world_unit.translation();
+  if (kind != Kind::sphere) centre += 0.5 * (from + to) * m.col(2);
   return {centre - half, centre + half};
+}
+
+int Quadric::pieces() const {
+  if (kind == Kind::sphere) return 1;
+  constexpr int kMost = 32;
+  constexpr double kShortest = 0.3;  // metres
+  const Eigen::Matrix3d m = T_world_unit.linear();
+  const double width = m.col(0).norm() + m.col(1).norm();
+  Eigen::Vector3d extent = 2 * m.col(2).cwiseAbs();
+  std::sort(extent.data(), extent.data() + 3);
+  if (extent[1] < 4 * width) return 1;  // nearly along an axis
+  const double length = 2 * m.col(2).norm();
+  return std::clamp(static_cast<int>(length / std::max(4 * width, kShortest)), 1, kMost);
 }
 
 }  // namespace pade::simulation

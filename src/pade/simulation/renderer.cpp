@@ -130,13 +130,14 @@ Eigen::Array3f Renderer::Implementation::shade(const Fragment& fragment, const E
         paint.scale * Eigen::Vector2f(frame.gradient_u.dot(across), frame.gradient_v.dot(across));
     const Eigen::Vector2f dv =
         paint.scale * Eigen::Vector2f(frame.gradient_u.dot(along), frame.gradient_v.dot(along));
-    Eigen::Array3f texel = paint.texture->sample(at, du, dv);
-    if (paint.stained) {
+    const int most_taps = std::min(2 * samples, 8);  // no finer than the rays
+    Eigen::Array3f texel = paint.texture->sample(at, du, dv, most_taps);
+    if (paint.stained && samples > 1) {  // a preview does without
       // Turned and scaled by numbers that share no period with the tile.
       constexpr float kC = 0.83F;
       constexpr float kS = 0.56F;
       const Eigen::Vector2f turned(kC * at.x() - kS * at.y(), kS * at.x() + kC * at.y());
-      texel *= 0.72F + 0.56F * clouds.sample(turned, du, dv);
+      texel *= 0.72F + 0.56F * clouds.sample(turned, du, dv, samples == 1 ? 1 : most_taps);
     }
     albedo *= (paint.mean + paint.contrast * (texel - paint.mean)).max(0.005F);
   }
@@ -164,14 +165,14 @@ Eigen::Array3f Renderer::Implementation::sky(const Eigen::Vector3d& direction) c
 
 namespace {
 
-/// The pixels of one packet: eight neighbours in a row, with their samples and the surfaces that these hit.
+/// The pixels of one packet: a tile of neighbours, with their samples and the surfaces that these hit.
 class Block {
  public:
   Block(const Scene& scene, const RayGrid& grid, const Pose& pose,
         const std::vector<Eigen::Vector2d>& offsets)
       : scene_(scene), grid_(grid), R_(pose.matrix3()), origin_(pose.translation), offsets_(offsets) {}
 
-  void trace(int first, int row);
+  void trace(int left, int top);
   void find_fragments(const RenderOptions& options, const Eigen::Vector3d& to_sun);
   void trace_shadows(const Eigen::Vector3d& to_sun);
 
@@ -215,12 +216,14 @@ void Block::trace_packet(const RayPacket& rays, std::array<Lane, kLanes>& lanes)
   }
 }
 
-void Block::trace(int first, int row) {
+void Block::trace(int left, int top) {
   RayPacket centres{};
   for (int lane = 0; lane < kLanes; ++lane) {
     const auto i = static_cast<std::size_t>(lane);
-    const int column = first + lane;
-    seen_[i] = column < grid_.camera().width && grid_.ray(column, row).x() == grid_.ray(column, row).x();
+    const int column = left + lane % ray_packet_side;
+    const int row = top + lane / ray_packet_side;
+    seen_[i] = column < grid_.camera().width && row < grid_.camera().height &&
+               grid_.ray(column, row).x() == grid_.ray(column, row).x();
     if (!seen_[i]) continue;
     const Eigen::Vector2d& ray = grid_.ray(column, row);
     const Eigen::Matrix2d step = grid_.step(column, row);
@@ -323,14 +326,16 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
   const int samples = std::clamp(options.samples, 1, kMostSamples);
   const std::vector<Eigen::Vector2d> offsets = sample_pattern(samples);
   const bool shadows = options.shadows && self.scene.world().sun && self.scene.world().sun->casts_shadows;
-  parallel_rows(size.height, threads, [&](int row) {
+  parallel_rows(tile_rows(size.height, ray_packet_side), threads, [&](int tile) {
     Block block(self.scene, grid, T_world_camera, offsets);
-    for (int first = 0; first < size.width; first += kLanes) {
-      block.trace(first, row);
+    for (int left = 0; left < size.width; left += ray_packet_side) {
+      block.trace(left, tile * ray_packet_side);
       block.find_fragments(options, self.to_sun);
       if (shadows) block.trace_shadows(self.to_sun);
-      for (int lane = 0; lane < std::min(kLanes, size.width - first); ++lane) {
+      for (int lane = 0; lane < kLanes; ++lane) {
         if (!block.seen(lane)) continue;
+        const int column = left + lane % ray_packet_side;
+        const int row = tile * ray_packet_side + lane / ray_packet_side;
         const Block::Pixel& pixel = block.pixel(lane);
         Eigen::Array3f light = Eigen::Array3f::Zero();
         for (std::size_t f = 0; f < static_cast<std::size_t>(pixel.count); ++f) {
@@ -341,9 +346,9 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
           light += self.sky(block.centre(lane).direction) *
                    (static_cast<float>(pixel.sky) / static_cast<float>(samples));
         }
-        out.radiance.at<cv::Vec3f>(row, first + lane) = {light[0], light[1], light[2]};
+        out.radiance.at<cv::Vec3f>(row, column) = {light[0], light[1], light[2]};
         if (block.centre(lane).primitive.hit()) {
-          out.depth.at<float>(row, first + lane) = static_cast<float>(block.centre(lane).depth);
+          out.depth.at<float>(row, column) = static_cast<float>(block.centre(lane).depth);
         }
       }
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <type_traits>
 
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
@@ -21,7 +22,8 @@ constexpr unsigned kCastsShadow = 2;
 
 void quadric_bounds(const RTCBoundsFunctionArguments* args) {
   const auto& geometry = *static_cast<const Geometry*>(args->geometryUserPtr);
-  const Eigen::AlignedBox3d box = geometry.quadrics[args->primID].bounds();
+  const Geometry::QuadricPiece& piece = geometry.quadric_pieces[args->primID];
+  const Eigen::AlignedBox3d box = geometry.quadrics[piece.quadric].bounds(piece.from, piece.to);
   // Outward by a rounding step, since the bounds are single precision.
   const auto below = [](double x) {
     return std::nextafter(static_cast<float>(x), -std::numeric_limits<float>::max());
@@ -45,7 +47,7 @@ std::optional<Quadric::Hit> hit_quadric(const Quadric& quadric, RTCRayN* ray, un
 
 void quadric_intersect(const RTCIntersectFunctionNArguments* args) {
   const auto& geometry = *static_cast<const Geometry*>(args->geometryUserPtr);
-  const Quadric& quadric = geometry.quadrics[args->primID];
+  const Quadric& quadric = geometry.quadrics[geometry.quadric_pieces[args->primID].quadric];
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, args->N);
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, args->N);
   for (unsigned i = 0; i < args->N; ++i) {
@@ -61,8 +63,9 @@ void quadric_intersect(const RTCIntersectFunctionNArguments* args) {
 
 void quadric_occluded(const RTCOccludedFunctionNArguments* args) {
   const auto& geometry = *static_cast<const Geometry*>(args->geometryUserPtr);
-  const Quadric& quadric = geometry.quadrics[args->primID];
-  const bool casts_shadow = geometry.quadric_casts_shadow[args->primID];
+  const std::uint32_t index = geometry.quadric_pieces[args->primID].quadric;
+  const Quadric& quadric = geometry.quadrics[index];
+  const bool casts_shadow = geometry.quadric_casts_shadow[index];
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] == 0) continue;
     if (!casts_shadow && (RTCRayN_mask(args->ray, args->N, i) & kSeen) == 0) continue;
@@ -84,28 +87,30 @@ struct Device {
   }
 };
 
+/// Lanes `first` and on of a packet, as many as `ray` has.
 template <class Ray>
-void fill(Ray& ray, const RayPacket& rays, unsigned mask) {
-  for (std::size_t i = 0; i < ray_packet_size; ++i) {
-    ray.org_x[i] = rays.origin_x[i];
-    ray.org_y[i] = rays.origin_y[i];
-    ray.org_z[i] = rays.origin_z[i];
-    ray.dir_x[i] = rays.direction_x[i];
-    ray.dir_y[i] = rays.direction_y[i];
-    ray.dir_z[i] = rays.direction_z[i];
-    ray.tnear[i] = rays.nearest[i];
-    ray.tfar[i] = rays.farthest[i];
-    ray.time[i] = 0;
-    ray.mask[i] = mask;
-    ray.id[i] = 0;
-    ray.flags[i] = 0;
-  }
+void fill(Ray& ray, const RayPacket& rays, std::size_t first, unsigned mask) {
+  constexpr std::size_t kLanes = std::extent_v<decltype(ray.org_x)>;
+  const auto copy = [first](auto& to, const RayPacket::Lanes& from) {
+    std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), kLanes, std::begin(to));
+  };
+  copy(ray.org_x, rays.origin_x);
+  copy(ray.org_y, rays.origin_y);
+  copy(ray.org_z, rays.origin_z);
+  copy(ray.dir_x, rays.direction_x);
+  copy(ray.dir_y, rays.direction_y);
+  copy(ray.dir_z, rays.direction_z);
+  copy(ray.tnear, rays.nearest);
+  copy(ray.tfar, rays.farthest);
+  std::fill_n(ray.time, kLanes, 0.0F);
+  std::fill_n(ray.mask, kLanes, mask);
+  std::fill_n(ray.id, kLanes, 0U);
+  std::fill_n(ray.flags, kLanes, 0U);
 }
 
-RTCRay lane_of(const RTCRay8& packet, std::size_t i) {
-  return {packet.org_x[i], packet.org_y[i], packet.org_z[i], packet.tnear[i],
-          packet.dir_x[i], packet.dir_y[i], packet.dir_z[i], packet.time[i],
-          packet.tfar[i],  packet.mask[i],  packet.id[i],    packet.flags[i]};
+RTCRay lane_of(const RayPacket& rays, std::size_t i, unsigned mask) {
+  return {rays.origin_x[i],    rays.origin_y[i],    rays.origin_z[i], rays.nearest[i], rays.direction_x[i],
+          rays.direction_y[i], rays.direction_z[i], 0,                rays.farthest[i], mask, 0, 0};
 }
 
 RTCIntersectContext coherent_context() {
@@ -121,12 +126,15 @@ struct Scene::Implementation {
   World world;
   Geometry geometry;
   Device embree;
-  bool packets = true;  // the machine has rays by eight
+  std::size_t lanes = 1;  // rays that the machine traces together
   std::unique_ptr<AmbientOcclusion> occlusion;
 
   Status attach();
   void attach_triangles(unsigned id, std::size_t first, std::size_t last, unsigned mask) const;
   [[nodiscard]] HitPacket nearest(const RayPacket& rays) const;
+  template <class RayHits, class Intersect>
+  void intersect(const RayPacket& rays, std::size_t first, const Intersect& with, HitPacket& hits) const;
+  [[nodiscard]] Primitive primitive(unsigned geometry_id, unsigned primitive_id) const;
 };
 
 void Scene::Implementation::attach_triangles(unsigned id, std::size_t first, std::size_t last,
@@ -153,7 +161,12 @@ Status Scene::Implementation::attach() {
     return Error{fmt::format("Embree: found error {} while starting, expected a device",
                              static_cast<int>(rtcGetDeviceError(nullptr)))};
   }
-  packets = rtcGetDeviceProperty(embree.device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
+  const auto native = [this](RTCDeviceProperty width) {
+    return rtcGetDeviceProperty(embree.device, width) != 0;
+  };
+  lanes = native(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)  ? 16
+          : native(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8
+                                                              : 1;
   embree.scene = rtcNewScene(embree.device);
   rtcSetSceneFlags(embree.scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(embree.scene, RTC_BUILD_QUALITY_HIGH);
@@ -161,7 +174,7 @@ Status Scene::Implementation::attach() {
   attach_triangles(kShadowlessTriangles, geometry.shadow_triangles, geometry.triangles.size(), kSeen);
   if (!geometry.quadrics.empty()) {
     RTCGeometry quadrics = rtcNewGeometry(embree.device, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(quadrics, static_cast<unsigned>(geometry.quadrics.size()));
+    rtcSetGeometryUserPrimitiveCount(quadrics, static_cast<unsigned>(geometry.quadric_pieces.size()));
     rtcSetGeometryUserData(quadrics, &geometry);
     rtcSetGeometryBoundsFunction(quadrics, quadric_bounds, nullptr);
     rtcSetGeometryIntersectFunction(quadrics, quadric_intersect);
@@ -204,57 +217,71 @@ const Geometry& Scene::geometry() const { return implementation_->geometry; }
 
 HitPacket Scene::nearest(const RayPacket& rays) const { return implementation_->nearest(rays); }
 
-HitPacket Scene::Implementation::nearest(const RayPacket& rays) const {
-  alignas(32) RTCRayHit8 packet;
-  fill(packet.ray, rays, kSeen);
-  for (unsigned& id : packet.hit.geomID) id = RTC_INVALID_GEOMETRY_ID;
+Primitive Scene::Implementation::primitive(unsigned geometry_id, unsigned primitive_id) const {
+  if (geometry_id == RTC_INVALID_GEOMETRY_ID) return {};
+  if (geometry_id == kQuadrics) return {geometry.quadric_pieces[primitive_id].quadric | Primitive::quadric_bit};
+  const bool late = geometry_id == kShadowlessTriangles;
+  return {primitive_id + (late ? static_cast<std::uint32_t>(geometry.shadow_triangles) : 0U)};
+}
+
+template <class RayHits, class Intersect>
+void Scene::Implementation::intersect(const RayPacket& rays, std::size_t first, const Intersect& with,
+                                      HitPacket& hits) const {
   RTCIntersectContext context = coherent_context();
-  if (packets) {
-    rtcIntersect8(rays.active.data(), embree.scene, &context, &packet);
-  } else {
-    for (std::size_t i = 0; i < ray_packet_size; ++i) {
-      if (rays.active[i] == 0) continue;
-      RTCRayHit single{lane_of(packet.ray, i), {}};
-      single.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-      rtcIntersect1(embree.scene, &context, &single);
-      packet.ray.tfar[i] = single.ray.tfar;
-      packet.hit.geomID[i] = single.hit.geomID;
-      packet.hit.primID[i] = single.hit.primID;
-    }
+  RayHits packet;
+  constexpr std::size_t kLanes = std::extent_v<decltype(packet.ray.org_x)>;
+  fill(packet.ray, rays, first, kSeen);
+  std::fill_n(packet.hit.geomID, kLanes, RTC_INVALID_GEOMETRY_ID);
+  with(rays.active.data() + first, embree.scene, &context, &packet);
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    hits.distance[first + i] = packet.ray.tfar[i];
+    hits.primitive[first + i] = rays.active[first + i] == 0
+                                    ? Primitive{}
+                                    : primitive(packet.hit.geomID[i], packet.hit.primID[i]);
   }
+}
+
+HitPacket Scene::Implementation::nearest(const RayPacket& rays) const {
   HitPacket hits;
-  for (std::size_t i = 0; i < ray_packet_size; ++i) {
-    hits.distance[i] = packet.ray.tfar[i];
-    const bool hit = rays.active[i] != 0 && packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-    if (!hit) {
-      hits.primitive[i].id = Primitive::none;
-    } else if (packet.hit.geomID[i] == kQuadrics) {
-      hits.primitive[i].id = packet.hit.primID[i] | Primitive::quadric_bit;
+  for (std::size_t first = 0; first < ray_packet_size; first += lanes) {
+    if (lanes == 16) {
+      intersect<RTCRayHit16>(rays, first, rtcIntersect16, hits);
+    } else if (lanes == 8) {
+      intersect<RTCRayHit8>(rays, first, rtcIntersect8, hits);
     } else {
-      const bool late = packet.hit.geomID[i] == kShadowlessTriangles;
-      hits.primitive[i].id =
-          packet.hit.primID[i] + (late ? static_cast<std::uint32_t>(geometry.shadow_triangles) : 0U);
+      RTCIntersectContext context = coherent_context();
+      RTCRayHit single{lane_of(rays, first, kSeen), {}};
+      single.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      if (rays.active[first] != 0) rtcIntersect1(embree.scene, &context, &single);
+      hits.distance[first] = single.ray.tfar;
+      hits.primitive[first] = primitive(single.hit.geomID, single.hit.primID);
     }
   }
   return hits;
 }
 
 std::array<bool, ray_packet_size> Scene::occluded(const RayPacket& rays, Blockers blockers) const {
-  alignas(32) RTCRay8 packet;
-  fill(packet, rays, blockers == Blockers::everything ? kSeen : kCastsShadow);
+  const unsigned mask = blockers == Blockers::everything ? kSeen : kCastsShadow;
+  const RTCScene scene = implementation_->embree.scene;
   RTCIntersectContext context = coherent_context();
-  if (implementation_->packets) {
-    rtcOccluded8(rays.active.data(), implementation_->embree.scene, &context, &packet);
-  } else {
-    for (std::size_t i = 0; i < ray_packet_size; ++i) {
-      if (rays.active[i] == 0) continue;
-      RTCRay single = lane_of(packet, i);
-      rtcOccluded1(implementation_->embree.scene, &context, &single);
-      packet.tfar[i] = single.tfar;
+  std::array<bool, ray_packet_size> hidden{};
+  const auto trace = [&](auto packet, std::size_t first, const auto& with) {
+    fill(packet, rays, first, mask);
+    with(rays.active.data() + first, scene, &context, &packet);
+    for (std::size_t i = 0; i < implementation_->lanes; ++i)
+      hidden[first + i] = rays.active[first + i] != 0 && packet.tfar[i] < 0;
+  };
+  for (std::size_t first = 0; first < ray_packet_size; first += implementation_->lanes) {
+    if (implementation_->lanes == 16) {
+      trace(RTCRay16(), first, rtcOccluded16);
+    } else if (implementation_->lanes == 8) {
+      trace(RTCRay8(), first, rtcOccluded8);
+    } else if (rays.active[first] != 0) {
+      RTCRay single = lane_of(rays, first, mask);
+      rtcOccluded1(scene, &context, &single);
+      hidden[first] = single.tfar < 0;
     }
   }
-  std::array<bool, ray_packet_size> hidden{};
-  for (std::size_t i = 0; i < ray_packet_size; ++i) hidden[i] = rays.active[i] != 0 && packet.tfar[i] < 0;
   return hidden;
 }
 

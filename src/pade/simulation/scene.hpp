@@ -1,5 +1,5 @@
-// The world as rays see it: nearest hit and occlusion by Embree, eight coherent rays at a time, and the exact
-// hit in double precision from the plane or the quadric that was hit.
+// The world as rays see it: nearest hit and occlusion by Embree, sixteen coherent rays at a time, and the
+// exact hit in double precision from the plane or the quadric that was hit.
 #pragma once
 
 #include <array>
@@ -16,12 +16,14 @@
 
 namespace pade::simulation {
 
-inline constexpr int ray_packet_size = 8;
-/// Eight rays. With directions of Z = 1 in camera coordinates distances are depths along the optical axis.
+/// A packet sees a tile of 4 x 4 pixels: the rays of a square stay together longer than those of a row.
+inline constexpr int ray_packet_side = 4;
+inline constexpr int ray_packet_size = ray_packet_side * ray_packet_side;
+/// Sixteen rays. With directions of Z = 1 in camera coordinates distances are depths along the optical axis.
 struct RayPacket {
   using Lanes = std::array<float, ray_packet_size>;
-  alignas(32) Lanes origin_x, origin_y, origin_z, direction_x, direction_y, direction_z, nearest, farthest;
-  alignas(32) std::array<int, ray_packet_size> active;  ///< -1 = trace, 0 = leave out
+  alignas(64) Lanes origin_x, origin_y, origin_z, direction_x, direction_y, direction_z, nearest, farthest;
+  alignas(64) std::array<int, ray_packet_size> active;  ///< -1 = trace, 0 = leave out
 
   void set(int lane, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float from, float to) {
     const auto i = static_cast<std::size_t>(lane);
@@ -49,7 +51,7 @@ struct Primitive {
 };
 
 struct HitPacket {
-  alignas(32) std::array<float, ray_packet_size> distance;
+  alignas(64) std::array<float, ray_packet_size> distance;
   std::array<Primitive, ray_packet_size> primitive;
 };
 

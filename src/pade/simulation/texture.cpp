@@ -11,7 +11,14 @@
 namespace pade::simulation {
 namespace {
 
-constexpr int kMostTaps = 8;
+/// Rows start a cache line later each time.
+constexpr int kRowPadding = 4;
+
+/// floor() for numbers that fit an int; the library's is a call where the processor's own cannot be assumed.
+int floor_of(float x) {
+  const int whole = static_cast<int>(x);
+  return static_cast<float>(whole) > x ? whole - 1 : whole;
+}
 
 int power_of_two(int pixels) {
   constexpr int kLargest = 4096;
@@ -27,14 +34,15 @@ Texture::Texture(const cv::Mat& pixels, const Eigen::Vector2f& size) {
   texels_per_unit_ = Eigen::Vector2f(static_cast<float>(fitting.width) / size.x(),
                                      static_cast<float>(fitting.height) / size.y());
   while (true) {
-    Level level{image.cols, image.rows, {}};
-    level.texels.reserve(image.total());
+    Level level{image.cols, image.rows, image.cols + kRowPadding, {}};
+    level.texels.reserve(static_cast<std::size_t>(level.stride) * static_cast<std::size_t>(image.rows));
     for (int y = 0; y < image.rows; ++y) {
       for (int x = 0; x < image.cols; ++x) {
         const auto& p = image.at<cv::Vec3f>(y, x);
         level.texels.emplace_back(std::clamp(p[0], 0.0F, 1.0F), std::clamp(p[1], 0.0F, 1.0F),
                                   std::clamp(p[2], 0.0F, 1.0F), 0.0F);
       }
+      level.texels.insert(level.texels.end(), kRowPadding, Texel::Zero());
     }
     levels_.push_back(std::move(level));
     if (image.total() == 1) break;
@@ -72,23 +80,23 @@ Texture Texture::clouds() {
 }
 
 Eigen::Array4f Texture::bilinear(const Level& level, float x, float y) {
-  const float left = std::floor(x - 0.5F);
-  const float top = std::floor(y - 0.5F);
-  const float fx = x - 0.5F - left;
-  const float fy = y - 0.5F - top;
-  const int x0 = static_cast<int>(left) & (level.width - 1);
-  const int y0 = static_cast<int>(top) & (level.height - 1);
+  const int left = floor_of(x - 0.5F);
+  const int top = floor_of(y - 0.5F);
+  const float fx = x - 0.5F - static_cast<float>(left);
+  const float fy = y - 0.5F - static_cast<float>(top);
+  const int x0 = left & (level.width - 1);
+  const int y0 = top & (level.height - 1);
   const int x1 = (x0 + 1) & (level.width - 1);
   const int y1 = (y0 + 1) & (level.height - 1);
   const auto texel = [&](int column, int row) -> const Texel& {
-    return level.texels[static_cast<std::size_t>(row * level.width + column)];
+    return level.texels[static_cast<std::size_t>(row * level.stride + column)];
   };
   return (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x1, y0)) +
          fy * ((1 - fx) * texel(x0, y1) + fx * texel(x1, y1));
 }
 
 Eigen::Array3f Texture::sample(const Eigen::Vector2f& at, const Eigen::Vector2f& across,
-                               const Eigen::Vector2f& down) const {
+                               const Eigen::Vector2f& down, int most_taps) const {
   const Eigen::Vector2f position = at.cwiseProduct(texels_per_unit_);
   Eigen::Vector2f longer = across.cwiseProduct(texels_per_unit_);
   Eigen::Vector2f shorter = down.cwiseProduct(texels_per_unit_);
@@ -96,7 +104,7 @@ Eigen::Array3f Texture::sample(const Eigen::Vector2f& at, const Eigen::Vector2f&
   const float length = std::min(longer.norm(), 1e6F);
   // The width of the parallelogram across its longer side.
   const float width = length > 0 ? std::abs(longer.x() * shorter.y() - longer.y() * shorter.x()) / length : 0;
-  const int taps = std::clamp(static_cast<int>(std::ceil(length / std::max(width, 1.0F))), 1, kMostTaps);
+  const int taps = std::clamp(static_cast<int>(std::ceil(length / std::max(width, 1.0F))), 1, most_taps);
   const float footprint = std::max(length / static_cast<float>(taps), width);
   const float level =
       std::clamp(std::log2(std::max(footprint, 1.0F)), 0.0F, static_cast<float>(levels_.size() - 1));

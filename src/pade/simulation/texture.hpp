@@ -26,9 +26,10 @@ class Texture {
   /// Grey clouds of mean 0.5, for stains and skies; about 0.7 m to 11 m long.
   static Texture clouds();
 
-  /// Mean over the parallelogram that `across` and `down` span about `at`: what one pixel sees. RGB.
+  /// Mean over the parallelogram that `across` and `down` span about `at`: what one pixel sees. RGB. `most_taps`:
+  /// reads along its longer side; with fewer a surface seen at a low angle is more blurred.
   [[nodiscard]] Eigen::Array3f sample(const Eigen::Vector2f& at, const Eigen::Vector2f& across,
-                                      const Eigen::Vector2f& down) const;
+                                      const Eigen::Vector2f& down, int most_taps = 8) const;
   [[nodiscard]] Eigen::Array3f mean() const;
 
  private:
@@ -36,6 +37,7 @@ class Texture {
   struct Level {
     int width = 1;
     int height = 1;
+    int stride = 1;  ///< texels from row to row: not a power of two, or the rows would share cache sets
     std::vector<Texel> texels;
   };
   [[nodiscard]] static Eigen::Array4f bilinear(const Level& level, float x, float y);
