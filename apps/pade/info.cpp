@@ -1,10 +1,13 @@
 // `pade info`: what is in a sequence, a map or a run, and whether it is sane.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -12,6 +15,7 @@
 
 #include "pade/evaluation/accuracy_tables.hpp"
 #include "pade/evaluation/run_evaluation.hpp"
+#include "pade/evaluation/scene_hardness.hpp"
 #include "pade/evaluation/sequence_check.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/map_files.hpp"
@@ -26,6 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using evaluation::PoseCheck;
+using evaluation::SceneHardness;
 using evaluation::SequenceCheck;
 using evaluation::Spread;
 
@@ -63,6 +68,18 @@ Json json_of(const io::GeographicOrigin& origin) {
   return {{"latitude_deg", origin.latitude_deg},
           {"longitude_deg", origin.longitude_deg},
           {"height_m", origin.height}};
+}
+
+Json json_of(const SceneHardness& hardness) {
+  Json ranges = Json::array();
+  for (std::size_t i = 0; i < hardness.in_range.size(); ++i)
+    ranges.push_back({{"to_m", SceneHardness::ends[i]}, {"share", hardness.share(hardness.in_range[i])}});
+  return {{"pixels", hardness.pixels},
+          {"depth_ranges", std::move(ranges)},
+          {"beyond", hardness.share(hardness.beyond)},
+          {"low_gradient", hardness.share(hardness.flat)},
+          {"near_depth_edge", hardness.share(hardness.near_edge)},
+          {"nearest_m", hardness.nearest ? Json(*hardness.nearest) : Json()}};
 }
 
 std::string_view verdict_name(PoseCheck::Verdict verdict) {
@@ -177,18 +194,88 @@ void print_sequence(const io::Sequence& sequence, const SequenceCheck& check) {
   for (const io::Skipped& item : sequence.skipped()) line("skipped", "{}: {}", item.file, item.reason);
 }
 
+constexpr std::string_view kHardnessHead = "   0-4   4-8  8-12 12-16   >16 m   flat  edge  nearest m";
+
+void print_hardness(const SceneHardness& hardness) {
+  line("scene, %", "{}", kHardnessHead);
+  line("", "{}", to_line(hardness));
+  line("", "flat: gradient below {:g} grey levels per pixel; edge: within {} px of a depth edge",
+       SceneHardness::low_gradient, SceneHardness::edge_reach);
+}
+
+/// The sequences that lie in a folder, each with its scene, and all of them together.
+Status inform_of_set(const Arguments& arguments, const std::vector<io::Sequence>& sequences) {
+  SceneHardness total;
+  Json rows = Json::array();
+  std::string table;
+  for (const io::Sequence& sequence : sequences) {
+    const std::string name = sequence.folder().filename().string();
+    if (!sequence.has_truth()) {
+      table += fmt::format("  {:<18} {} frames, no true depth\n", name, sequence.size());
+      rows.push_back(
+          {{"folder", sequence.folder().string()}, {"frames", sequence.size()}, {"scene", nullptr}});
+      continue;
+    }
+    const Result<SceneHardness> hardness = evaluation::scene_hardness(sequence);
+    if (!hardness) return hardness.error();
+    total += *hardness;
+    table += fmt::format("  {:<18} {}\n", name, to_line(*hardness));
+    rows.push_back(
+        {{"folder", sequence.folder().string()}, {"frames", sequence.size()}, {"scene", json_of(*hardness)}});
+  }
+  if (arguments.json) {
+    const Json json = {{"kind", "sequences"}, {"sequences", std::move(rows)}, {"scene", json_of(total)}};
+    fmt::print("{}\n", json.dump(2));
+    return {};
+  }
+  fmt::print("{}: {} sequences; share of the pixels in %\n  {:<18} {}\n{}", arguments.path, sequences.size(),
+             "", kHardnessHead, table);
+  if (total.pixels > 0) fmt::print("  {:<18} {}\n", "together", to_line(total));
+  fmt::print("  flat: gradient below {:g} grey levels per pixel; edge: within {} px of a depth edge\n",
+             SceneHardness::low_gradient, SceneHardness::edge_reach);
+  return {};
+}
+
+/// Folders below `path` that are sequences, by name.
+std::vector<io::Sequence> sequences_in(const fs::path& path, const io::SequenceOptions& options) {
+  std::vector<fs::path> folders;
+  std::error_code code;
+  for (const auto& entry : fs::directory_iterator(path, code)) {
+    const bool hidden = entry.path().filename().string().starts_with(".");
+    if (entry.is_directory(code) && !hidden) folders.push_back(entry.path());
+  }
+  std::sort(folders.begin(), folders.end());
+  std::vector<io::Sequence> found;
+  for (const fs::path& folder : folders) {
+    auto sequence = io::Sequence::open(folder, options);
+    if (sequence) found.push_back(std::move(sequence).value());
+  }
+  return found;
+}
+
 Status inform_of_sequence(const Arguments& arguments) {
   io::SequenceOptions options;
   options.poses = arguments.poses;
   options.world_up = arguments.world_up;
   const Result<io::Sequence> sequence = io::Sequence::open(arguments.path, options);
-  if (!sequence) return sequence.error();
+  if (!sequence) {
+    const std::vector<io::Sequence> below = sequences_in(arguments.path, options);
+    return below.empty() ? Status(sequence.error()) : inform_of_set(arguments, below);
+  }
   const Result<SequenceCheck> check = evaluation::check_sequence(*sequence, arguments.step);
   if (!check) return check.error();
-  if (arguments.json)
-    fmt::print("{}\n", json_of(*sequence, *check).dump(2));
-  else
-    print_sequence(*sequence, *check);
+  std::optional<SceneHardness> hardness;
+  if (sequence->has_truth()) {
+    if (auto found = evaluation::scene_hardness(*sequence)) hardness = *found;
+  }
+  if (arguments.json) {
+    Json json = json_of(*sequence, *check);
+    json["scene"] = hardness ? json_of(*hardness) : Json();
+    fmt::print("{}\n", json.dump(2));
+    return {};
+  }
+  print_sequence(*sequence, *check);
+  if (hardness) print_hardness(*hardness);
   return {};
 }
 
@@ -303,9 +390,11 @@ void add_info(CLI::App& app, Context& context) {
       "that pade expects (camera to world; camera x right, y down, z forward), tried on the images "
       "themselves.\n\n"
       "  pade info flight/          before mapping it\n"
+      "  pade info flights/         a folder of sequences: how hard the scene of each is, and of all\n"
       "  pade info out/flight       how a run went\n"
       "  pade info out/flight/map.bt\n");
-  command->add_option("PATH", arguments->path, "Sequence, map (.bt, .ot) or run")->required();
+  command->add_option("PATH", arguments->path, "Sequence, folder of sequences, map (.bt, .ot) or run")
+      ->required();
   command->add_option("--poses", arguments->poses, "groundtruth, original or a pose file")
       ->capture_default_str();
   command->add_option("--world-up", arguments->world_up,

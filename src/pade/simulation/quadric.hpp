@@ -33,7 +33,8 @@ struct Quadric {
   [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& unit_point, Part part) const;
   /// Of the part between two heights along the axis, -1 to 1; a sphere is whole.
   [[nodiscard]] Eigen::AlignedBox3d bounds(double from = -1, double to = 1) const;
-  /// Into how many equal lengths a tree of boxes had best cut it: a rod across all axes fills little of its box.
+  /// Into how many equal lengths a tree of boxes had best cut it: a rod across all axes fills little of its
+  /// box.
   [[nodiscard]] int pieces() const;
 
   static Quadric make(Kind kind, const Pose& T_world_shape, const Eigen::Vector3d& centre,

@@ -109,8 +109,18 @@ void fill(Ray& ray, const RayPacket& rays, std::size_t first, unsigned mask) {
 }
 
 RTCRay lane_of(const RayPacket& rays, std::size_t i, unsigned mask) {
-  return {rays.origin_x[i],    rays.origin_y[i],    rays.origin_z[i], rays.nearest[i], rays.direction_x[i],
-          rays.direction_y[i], rays.direction_z[i], 0,                rays.farthest[i], mask, 0, 0};
+  return {rays.origin_x[i],
+          rays.origin_y[i],
+          rays.origin_z[i],
+          rays.nearest[i],
+          rays.direction_x[i],
+          rays.direction_y[i],
+          rays.direction_z[i],
+          0,
+          rays.farthest[i],
+          mask,
+          0,
+          0};
 }
 
 RTCIntersectContext coherent_context() {
@@ -219,7 +229,8 @@ HitPacket Scene::nearest(const RayPacket& rays) const { return implementation_->
 
 Primitive Scene::Implementation::primitive(unsigned geometry_id, unsigned primitive_id) const {
   if (geometry_id == RTC_INVALID_GEOMETRY_ID) return {};
-  if (geometry_id == kQuadrics) return {geometry.quadric_pieces[primitive_id].quadric | Primitive::quadric_bit};
+  if (geometry_id == kQuadrics)
+    return {geometry.quadric_pieces[primitive_id].quadric | Primitive::quadric_bit};
   const bool late = geometry_id == kShadowlessTriangles;
   return {primitive_id + (late ? static_cast<std::uint32_t>(geometry.shadow_triangles) : 0U)};
 }
@@ -235,9 +246,8 @@ void Scene::Implementation::intersect(const RayPacket& rays, std::size_t first, 
   with(rays.active.data() + first, embree.scene, &context, &packet);
   for (std::size_t i = 0; i < kLanes; ++i) {
     hits.distance[first + i] = packet.ray.tfar[i];
-    hits.primitive[first + i] = rays.active[first + i] == 0
-                                    ? Primitive{}
-                                    : primitive(packet.hit.geomID[i], packet.hit.primID[i]);
+    hits.primitive[first + i] =
+        rays.active[first + i] == 0 ? Primitive{} : primitive(packet.hit.geomID[i], packet.hit.primID[i]);
   }
 }
 

@@ -26,8 +26,8 @@ class Texture {
   /// Grey clouds of mean 0.5, for stains and skies; about 0.7 m to 11 m long.
   static Texture clouds();
 
-  /// Mean over the parallelogram that `across` and `down` span about `at`: what one pixel sees. RGB. `most_taps`:
-  /// reads along its longer side; with fewer a surface seen at a low angle is more blurred.
+  /// Mean over the parallelogram that `across` and `down` span about `at`: what one pixel sees. RGB.
+  /// `most_taps`: reads along its longer side; with fewer a surface seen at a low angle is more blurred.
   [[nodiscard]] Eigen::Array3f sample(const Eigen::Vector2f& at, const Eigen::Vector2f& across,
                                       const Eigen::Vector2f& down, int most_taps = 8) const;
   [[nodiscard]] Eigen::Array3f mean() const;

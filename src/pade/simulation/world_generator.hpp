@@ -21,7 +21,8 @@ enum class WorldKind { building, street, forest, rubble, corridor };
 ///   before the lamps at x = 22.9 m, and along the line from (4, 16.5) to (18, 2)
 /// - street: a road along x between houses; free within 1.6 m of the centre line
 /// - forest: trees about a row of trunks on the x axis, 7 m apart, to be flown around
-/// - rubble: a half-collapsed hall along x with thin poles and wires; free within 0.9 m of y = 0 from 1.2 m to 2.6 m
+/// - rubble: a half-collapsed hall along x with thin poles and wires; free within 0.9 m of y = 0 from 1.2 m
+/// to 2.6 m
 /// - corridor: 4.4 m wide and 3.3 m high along x, windows on the left; free within 0.75 m of the centre line
 WorldFiles generate_world(WorldKind kind, std::uint64_t seed);
 
