@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pade/simulation/sensors/imu.hpp"
+
 namespace pade::simulation {
 namespace {
 
@@ -144,6 +146,64 @@ TEST(Trajectory, RefusesWhatTheVehicleCannotFly) {
               testing::HasSubstr("not finite"));
   EXPECT_THAT(refused({{{0, 0, 0}, 0, {}}, {{1, 0, 0}, 0, -1}}, {}),
               testing::HasSubstr("expected more than"));
+}
+
+/// Attitude, velocity and position from gyroscopes and accelerometers alone: fourth order in the time step of
+/// two samples (Magnus expansion for the attitude, Simpson and Runge-Kutta for the rest).
+struct DeadReckoning {
+  Eigen::Quaterniond R = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+
+  void step(const ImuSample& first, const ImuSample& middle, const ImuSample& last, double h,
+            double gravity) {
+    const auto turned = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                           double dt) {
+      // Rates a, b, c at the start, the middle and the end of dt.
+      const Eigen::Vector3d mean = (a + 4 * b + c) / 6;
+      return Eigen::Quaterniond(rotation_exp(dt * mean + dt * dt / 12 * a.cross(c)));
+    };
+    const Eigen::Vector3d& w0 = first.angular_rate;
+    const Eigen::Vector3d& w1 = middle.angular_rate;
+    const Eigen::Vector3d& w2 = last.angular_rate;
+    const Eigen::Vector3d quarter = (3 * w0 + 6 * w1 - w2) / 8;  // the parabola through the three
+    const Eigen::Quaterniond R1 = R * turned(w0, quarter, w1, 0.5 * h);
+    const Eigen::Quaterniond R2 = R * turned(w0, w1, w2, h);
+    const Eigen::Vector3d down(0, 0, -gravity);
+    const Eigen::Vector3d a0 = R * first.specific_force + down;
+    const Eigen::Vector3d a1 = R1 * middle.specific_force + down;
+    const Eigen::Vector3d a2 = R2 * last.specific_force + down;
+    position += h * velocity + h * h / 6 * (a0 + 2 * a1);
+    velocity += h / 6 * (a0 + 4 * a1 + a2);
+    R = R2.normalized();
+  }
+};
+
+TEST(Imu, WithoutNoiseDeadReckonsSixtySecondsWithinAMillimetre) {
+  std::vector<Waypoint> points;
+  for (int i = 0; i <= 16; ++i)
+    points.push_back({{8.0 * i, 3.0 * std::sin(i), 2 + std::cos(2.0 * i)}, 0.3 * i, {}});
+  TrajectoryOptions options;
+  options.roll = {0.15, 4, 0};
+  options.yaw = {0.2, 6, 1};
+  const Trajectory path = flown(points, options);
+  ASSERT_GE(path.duration(), 60);
+  constexpr double kPeriod = 0.005;
+  const ImuModel model = ImuModel::perfect();
+  Imu imu(model, 1);
+  const KinematicState start = path.at(0);
+  DeadReckoning body{start.R_world_body, start.velocity, start.position};
+  ImuSample first = imu.sample(start);
+  for (int i = 2; i <= 12000; i += 2) {
+    const ImuSample middle = imu.sample(path.at((i - 1) * kPeriod));
+    const ImuSample last = imu.sample(path.at(i * kPeriod));
+    body.step(first, middle, last, 2 * kPeriod, model.gravity);
+    first = last;
+  }
+  const KinematicState end = path.at(60);
+  EXPECT_LT((body.position - end.position).norm(), 1e-3);
+  EXPECT_LT(body.R.angularDistance(end.R_world_body), 1e-6);
+  EXPECT_GT((end.position - start.position).norm(), 50);
 }
 
 }  // namespace
