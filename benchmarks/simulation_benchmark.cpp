@@ -118,6 +118,16 @@ void SimulationFrame(benchmark::State& state) {
 }
 BENCHMARK(SimulationFrame)->DenseRange(0, 4)->Unit(benchmark::kMillisecond);
 
+/// By the clock on the wall, with 1 and 2 threads: only on an idle machine does the ratio mean anything.
+void SimulationFrameThreads(benchmark::State& state) {
+  const auto threads = static_cast<int>(state.range(1));
+  over_stations(state, [threads](const Stage& place, const RayGrid& grid, const Pose& pose) {
+    const Rendering rendering = place.renderer->render(grid, pose, {}, threads);
+    benchmark::DoNotOptimize(form_image(rendering.radiance, grid, {}, 0, 1, 1, threads));
+  });
+}
+BENCHMARK(SimulationFrameThreads)->ArgsProduct({{1}, {1, 2}})->UseRealTime()->Unit(benchmark::kMillisecond);
+
 void SimulationPreview(benchmark::State& state) {
   over_stations(state, [](const Stage& place, const RayGrid& grid, const Pose& pose) {
     const Rendering rendering = place.renderer->render(grid, pose, RenderOptions::preview());

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "pade/simulation/parallel.hpp"
+
 namespace pade::simulation {
 namespace {
 
@@ -61,7 +63,7 @@ float vignetting(const RayGrid& grid, double loss, int column, int row) {
 }  // namespace
 
 cv::Mat form_image(const cv::Mat& radiance, const RayGrid& grid, const ImageOptions& options, double time,
-                   std::uint64_t seed, std::uint64_t frame) {
+                   std::uint64_t seed, std::uint64_t frame, int threads) {
   static const DisplayCurve curve;
   const int channels = options.colour ? 3 : 1;
   const double swing =
@@ -71,7 +73,7 @@ cv::Mat form_image(const cv::Mat& radiance, const RayGrid& grid, const ImageOpti
   const auto read_noise = static_cast<float>(options.read_noise);
   const std::uint64_t stream = mixed(seed * 0x100000001b3ULL + frame);
   cv::Mat image(radiance.size(), CV_8UC(channels));
-  for (int row = 0; row < radiance.rows; ++row) {
+  parallel_rows(radiance.rows, threads, [&](int row) {
     const auto* light = radiance.ptr<cv::Vec3f>(row);
     auto* out = image.ptr<std::uint8_t>(row);
     for (int column = 0; column < radiance.cols; ++column) {
@@ -90,7 +92,7 @@ cv::Mat form_image(const cv::Mat& radiance, const RayGrid& grid, const ImageOpti
         *out++ = static_cast<std::uint8_t>(std::clamp(value * 255 + 0.5F, 0.0F, 255.0F));
       }
     }
-  }
+  });
   return image;
 }
 

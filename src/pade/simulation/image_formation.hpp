@@ -36,8 +36,8 @@ struct ImageOptions {
 };
 
 /// CV_8UC1 or CV_8UC3 (BGR) from linear RGB radiance. `time` (s) sets the exposure; the noise of a pixel
-/// depends on `seed`, `frame` and the pixel alone.
+/// depends on `seed`, `frame` and the pixel alone, so that any number of threads gives the same image.
 cv::Mat form_image(const cv::Mat& radiance, const RayGrid& grid, const ImageOptions& options, double time,
-                   std::uint64_t seed, std::uint64_t frame);
+                   std::uint64_t seed, std::uint64_t frame, int threads = 1);
 
 }  // namespace pade::simulation

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <future>
 #include <vector>
 
 #include <fmt/format.h>
@@ -109,7 +110,7 @@ std::string ground_truth(const std::vector<CameraStation>& stations) {
   return text;
 }
 
-Status write_png(const fs::path& file, const cv::Mat& image) {
+Result<std::string> png_bytes(const fs::path& file, const cv::Mat& image) {
   std::vector<unsigned char> bytes;
   // A fast setting: noise does not compress, whatever the effort.
   if (!cv::imencode(
@@ -117,8 +118,12 @@ Status write_png(const fs::path& file, const cv::Mat& image) {
           {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE})) {
     return Error{fmt::format("{}: cannot be encoded", file.string())};
   }
-  return io::write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                        io::Overwrite::replace);
+  return std::string(bytes.begin(), bytes.end());
+}
+
+Status write_png(const fs::path& file, const cv::Mat& image) {
+  const Result<std::string> bytes = png_bytes(file, image);
+  return bytes ? io::write_file(file, *bytes, io::Overwrite::replace) : Status(bytes.error());
 }
 
 cv::Mat depth_counts(const cv::Mat& depth) {
@@ -237,14 +242,20 @@ Status Recorder::frame(std::size_t index) const {
   const CameraStation& station = stations_[index];
   const std::string name = image_name(station.time);
   const Rendering rendering = exposed(index);
-  if (const Status s = write_png(work_ / "depth" / name, depth_counts(rendering.depth)); !s) return s;
+  const auto write_depth = [&] { return write_png(work_ / "depth" / name, depth_counts(rendering.depth)); };
+  std::future<Status> depth_written =
+      std::async(options_.threads > 1 ? std::launch::async : std::launch::deferred, write_depth);
   if (options_.save_flow) {
     if (const Status s = flow(index, rendering.depth); !s) return s;
   }
   // The stamp, not the index, seeds the noise: leaving frames out does not change the others.
-  const cv::Mat image = form_image(rendering.radiance, grid_, flight_.image, station.time.seconds(),
-                                   options_.seed, static_cast<std::uint64_t>(station.time.nanoseconds));
-  return write_png(work_ / "rgb" / name, image);
+  const cv::Mat image =
+      form_image(rendering.radiance, grid_, flight_.image, station.time.seconds(), options_.seed,
+                 static_cast<std::uint64_t>(station.time.nanoseconds), options_.threads);
+  const Result<std::string> encoded = png_bytes(work_ / "rgb" / name, image);
+  if (const Status s = depth_written.get(); !s) return s;
+  if (!encoded) return encoded.error();
+  return io::write_file(work_ / "rgb" / name, *encoded, io::Overwrite::replace);
 }
 
 Status Recorder::flow(std::size_t index, const cv::Mat& depth) const {
