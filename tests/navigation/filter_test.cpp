@@ -56,6 +56,52 @@ TEST(Filter, PropagatesTheSameCovarianceInOneStrideAsInMany) {
   EXPECT_LT((one.state().X.p - many.state().X.p).norm(), 1e-9);
 }
 
+TEST(Vibration, IsTheSpreadOfTheSamplesWhateverTheMotion) {
+  Random random(4);
+  Vibration vibration;
+  Vibration calm;
+  for (int i = 0; i < 4000; ++i) {
+    const double t = 0.005 * i;
+    const Vector3d rate(std::sin(5 * t), 0.5 * std::cos(3 * t), 1);
+    const Vector3d force(3 * std::sin(4 * t), 2 * std::cos(2 * t), 9.8);
+    calm.observe({at(t), rate, force}, 0.06);
+    vibration.observe({at(t), rate + 0.1 * random.normal3(), force + 0.7 * random.normal3()}, 0.06);
+  }
+  EXPECT_LT(calm.rate_variance.maxCoeff(), 1e-7);
+  EXPECT_LT(calm.force_variance.maxCoeff(), 1e-6);
+  EXPECT_NEAR(vibration.interval, 0.005, 1e-5);
+  for (int axis = 0; axis < 3; ++axis) {  // averaged over about 200 samples
+    EXPECT_NEAR(std::sqrt(vibration.rate_variance[axis]), 0.1, 0.02);
+    EXPECT_NEAR(std::sqrt(vibration.force_variance[axis]), 0.7, 0.14);
+  }
+}
+
+TEST(Vibration, DoesNotTakeAGapForVibration) {
+  Vibration vibration;
+  for (int i = 0; i < 2000; ++i) {
+    const double t = i < 1000 ? 0.005 * i : 0.005 * i + 0.8;
+    vibration.observe({at(t), Vector3d(0.5 * t, 0, 0), Vector3d(0, 0, 9.8 + t)}, 0.06);
+  }
+  EXPECT_LT(vibration.rate_variance.maxCoeff(), 1e-7);
+  EXPECT_LT(vibration.force_variance.maxCoeff(), 1e-4);
+}
+
+TEST(Filter, GrowsItsDoubtWithTheVibration) {
+  double sigma[2];
+  for (int k = 0; k < 2; ++k) {
+    Filter filter = started();
+    Random random(4);
+    for (int i = 1; i <= 1000; ++i) {
+      const Vector3d force = Vector3d(0, 0, 9.8) + (k == 0 ? 0.1 : 4.0) * random.normal3();
+      filter.propagate(at(0.005 * i), Vector3d::Zero(), force, Vector3d::Zero());
+      filter.observe({at(0.005 * i), Vector3d::Zero(), force});
+      if (i % 40 == 0) filter.update(GnssVelocity{at(0.005 * i), filter.state().X.v, 2.5e-3 * Matrix3d::Identity()});
+    }
+    sigma[k] = std::sqrt(filter.covariance()(kNu, kNu));
+  }
+  EXPECT_GT(sigma[1], 1.2 * sigma[0]);
+}
+
 TEST(Filter, KeepsASymmetricPositiveCovarianceThroughAnything) {
   Filter filter = started();
   Random random(1);
@@ -110,7 +156,7 @@ TEST(Filter, RelativeCovarianceMatchesManyRunsWithErrorsDrawnFromTheStartingCova
   const int clone = reference.clone();
   fly(reference, 0.5);
   const CloneMotion motion = reference.motion_since(clone);
-  Filter noiseless_model(FilterOptions{.gyroscope_noise = 0, .accelerometer_noise = 0}, kLever);
+  Filter noiseless_model(FilterOptions{.gyroscope_noise = 0, .accelerometer_noise = 0, .gyroscope_vibration = 0, .accelerometer_vibration = 0}, kLever);
   noiseless_model.start(NavigationState{}, loose_covariance());
   fly(noiseless_model, 0.2);
   noiseless_model.clone();

@@ -161,12 +161,12 @@ struct Sequence {
       force.push_back(Vector3d(0, 0, 9.8) + 2 * random.normal3());
     }
   }
-  [[nodiscard]] ImuIncrement accumulated(const Vector6d& bias, double rate_density = 0,
-                                         double force_density = 0) const {
+  [[nodiscard]] ImuIncrement accumulated(const Vector6d& bias, double rate_power = 0,
+                                         double force_power = 0) const {
     ImuIncrement increment;
     for (std::size_t i = 0; i < rate.size(); ++i) {
       accumulate(increment, imu_step(rate[i] - bias.head<3>(), force[i] - bias.tail<3>(), dt), dt,
-                 rate_density, force_density);
+                 Vector3d::Constant(rate_power), Vector3d::Constant(force_power));
     }
     return increment;
   }
@@ -214,7 +214,7 @@ TEST(ImuIncrement, NoiseHasTheCovarianceOfManyNoisyRuns) {
   const Sequence clean(random, 20);
   const double rate_density = 0.01;
   const double force_density = 0.1;
-  const ImuIncrement increment = clean.accumulated(Vector6d::Zero(), rate_density, force_density);
+  const ImuIncrement increment = clean.accumulated(Vector6d::Zero(), rate_density * rate_density, force_density * force_density);
   const ExtendedPose end = moved(ExtendedPose{}, increment);
   const Eigen::LLT<Matrix9d> factor(increment.noise);
   const int runs = 4000;

@@ -12,6 +12,8 @@ constexpr double kHopeless = 15;           // log-likelihood behind the best at 
 constexpr double kUnknownPosition = 1e4;   // m
 constexpr double kMotionTiltSigma = 0.08;  // of the first level in motion, rad
 constexpr double kMotionForceDoubt = 0.3;  // m/s²
+constexpr double kRestRateSigma = 2e-3;    // of the mean rate at rest, rad/s
+constexpr double kRestForceSigma = 0.06;   // of the mean force at rest, m/s²
 
 Vector3d yaw_axis(const Quaterniond& R) {
   const bool upright = std::abs((R * Vector3d::UnitX()).z()) < 0.94;
@@ -103,12 +105,11 @@ void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw
   state.gyroscope_bias = rest.angular_rate;
   constexpr double kAnyTilt = 0.5;
   BaseMatrix P = prior(filter.options(), state.X.R, kAnyTilt, yaw_sigma, 0.05);
-  const double rate_sigma = 3 * filter.options().gyroscope_noise / std::sqrt(rest.duration) + 1e-3;
+  const double rate_sigma = kRestRateSigma;
   P.diagonal().segment<3>(kGyroscopeBias).setConstant(rate_sigma * rate_sigma);
   filter.start(state, P);
   // The update ties tilt to accelerometer bias as they are tied in truth: only their sum was seen.
-  filter.update_static_force(rest.specific_force,
-                             3 * filter.options().accelerometer_noise / std::sqrt(rest.duration));
+  filter.update_static_force(rest.specific_force, kRestForceSigma);
 }
 
 Yaw yaw_of(Filter& filter) {
@@ -173,8 +174,8 @@ bool Alignment::start_in_motion(Timeline& timeline, Time now) {
   for (std::size_t i = begin; i < end; ++i) {
     const double dt = seconds_between(time, timeline.imu[i].time);
     if (dt > 0)
-      accumulate(increment, imu_step(timeline.imu[i].angular_rate, timeline.imu[i].specific_force, dt), dt, 0,
-                 0);
+      accumulate(increment, imu_step(timeline.imu[i].angular_rate, timeline.imu[i].specific_force, dt), dt,
+                 Vector3d::Zero(), Vector3d::Zero());
     time = timeline.imu[i].time;
   }
   const FilterOptions& filter_options = bank_.front().filter.options();

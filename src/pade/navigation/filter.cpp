@@ -7,7 +7,10 @@
 namespace pade::navigation {
 namespace {
 
-constexpr double kSmoothTime = 2.0;  // s
+constexpr double kSmoothTime = 2.0;     // s
+constexpr double kVibrationTime = 1.0;  // over which the level of vibration is averaged, s
+constexpr double kLargestRateVariance = 1;     // what is more is a fault, (rad/s)²
+constexpr double kLargestForceVariance = 400;  // (m/s²)²
 constexpr int kLeastRejections = 3;  // in a row, before a sensor is believed against the filter
 
 double wrap_angle(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
@@ -19,16 +22,42 @@ Matrix3d floored(const Matrix3d& covariance, double floor) {
   return result;
 }
 
+/// White noise of each axis, unit²/Hz: the instrument's own and the share of vibration of the given variance.
+Vector3d noise_power(double density, double share, const Vector3d& variance, double interval) {
+  return Vector3d::Constant(density * density) + share * share * interval * variance;
+}
+
 }  // namespace
 
 FilterOptions FilterOptions::of(ImuClass imu) {
   FilterOptions options;
   if (imu == ImuClass::consumer) {
-    options.gyroscope_noise = 6e-4;
+    options.gyroscope_noise = 1e-4;
+    options.gyroscope_vibration = 0.2;
     options.gyroscope_bias_walk = 3e-5;
     options.accelerometer_bias_sigma = 0.3;
   }
   return options;
+}
+
+void Vibration::observe(const ImuSample& sample, double longest_interval) {
+  const double dt = seconds_between(last.time, sample.time);
+  if (samples > 0 && (dt <= 0 || dt > longest_interval)) samples = 0;
+  if (samples >= 2) {
+    // The second difference of white samples has six times their variance; smooth motion has hardly any.
+    const double gain = 1 - std::exp(-dt / kVibrationTime);
+    const auto learn = [&](Vector3d& variance, const Vector3d& difference, double largest) {
+      variance += gain * (difference.cwiseAbs2().cwiseMin(6 * largest) / 6 - variance);
+    };
+    learn(rate_variance, sample.angular_rate - 2 * last.angular_rate + before_last.angular_rate,
+          kLargestRateVariance);
+    learn(force_variance, sample.specific_force - 2 * last.specific_force + before_last.specific_force,
+          kLargestForceVariance);
+    interval += gain * (dt - interval);
+  }
+  before_last = last;
+  last = sample;
+  ++samples;
 }
 
 void Filter::start(const NavigationState& state, const BaseMatrix& covariance) {
@@ -71,8 +100,15 @@ void Filter::propagate(Time to, const Vector3d& rate_mean, const Vector3d& force
   // A saturated sensor has seen less than there was.
   const bool rate_saturated = rate_mean.cwiseAbs().maxCoeff() > options_.gyroscope_range;
   const bool force_saturated = force_mean.cwiseAbs().maxCoeff() > options_.accelerometer_range;
-  accumulate(core_.pending, step, dt, options_.gyroscope_noise * (rate_saturated ? 300 : 1),
-             options_.accelerometer_noise * (force_saturated ? 300 : 1));
+  const Vibration& vibration = core_.vibration;
+  const double saturated = 1e5;
+  accumulate(core_.pending, step, dt,
+             noise_power(options_.gyroscope_noise, options_.gyroscope_vibration, vibration.rate_variance,
+                         vibration.interval) *
+                 (rate_saturated ? saturated : 1),
+             noise_power(options_.accelerometer_noise, options_.accelerometer_vibration,
+                         vibration.force_variance, vibration.interval) *
+                 (force_saturated ? saturated : 1));
 
   const Vector3d gravity(0, 0, -options_.gravity);
   const Matrix3d R = state.X.R.toRotationMatrix();

@@ -45,10 +45,24 @@ struct GnssErrorClass {
   double correlation_time = 0;  ///< 0: no bias known yet
 };
 
+/// How much the samples of an axis differ from a smooth motion: rotor and engine vibration, which aliases into
+/// the band of the motion.
+struct Vibration {
+  ImuSample last;
+  ImuSample before_last;
+  double interval = 0.005;                                    ///< between samples, s
+  Vector3d rate_variance = Vector3d::Constant(1e-4);  ///< (rad/s)²
+  Vector3d force_variance = Vector3d::Constant(0.25);  ///< (m/s²)²
+  int samples = 0;
+
+  void observe(const ImuSample& sample, double longest_interval);
+};
+
 /// Everything of the filter but its covariance and clones.
 struct FilterCore {
   NavigationState state;
   ImuIncrement pending;  ///< motion since the covariance was valid
+  Vibration vibration;
   GnssErrorClass gnss_class;
   bool height_known = false;                    ///< the barometer's zero has been set
   Vector3d smooth_position = Vector3d::Zero();  ///< smooth minus filtered position, decaying, ENU, m
@@ -93,6 +107,8 @@ class Filter {
   /// Moves the state over the interval between two IMU values by their mean (trapezoid). `to` must not lie
   /// before state().time.
   void propagate(Time to, const Vector3d& rate_mean, const Vector3d& force_mean, const Vector3d& rate_end);
+  /// Learns the level of vibration from a sample that the state has been moved to.
+  void observe(const ImuSample& sample) { core_.vibration.observe(sample, options_.gap); }
   /// Adds the doubt that a gap of `duration` without samples leaves.
   void add_gap_noise(double duration);
 

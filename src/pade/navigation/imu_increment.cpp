@@ -52,8 +52,8 @@ ImuStep imu_step(const Vector3d& rate, const Vector3d& force, double dt) {
   return step;
 }
 
-void accumulate(ImuIncrement& increment, const ImuStep& step, double dt, double rate_density,
-                double force_density) {
+void accumulate(ImuIncrement& increment, const ImuStep& step, double dt, const Vector3d& rate_power,
+                const Vector3d& force_power) {
   increment.p += dt * increment.v + increment.R * step.p;
   increment.v += increment.R * step.v;
   increment.R *= step.R;
@@ -66,8 +66,7 @@ void accumulate(ImuIncrement& increment, const ImuStep& step, double dt, double 
   Matrix9d transposed = increment.noise.transpose();
   transport(step, dt, transposed);
   Eigen::Matrix<double, 6, 1> variance;  // of the mean rate and force over dt
-  variance << Vector3d::Constant(rate_density * rate_density / dt),
-      Vector3d::Constant(force_density * force_density / dt);
+  variance << rate_power / dt, force_power / dt;
   increment.noise = transposed;
   increment.noise.noalias() += step.input_jacobian * variance.asDiagonal() * step.input_jacobian.transpose();
 }

@@ -33,8 +33,8 @@ struct ImuStep {
 /// °/s and 200 Hz).
 ImuStep imu_step(const Vector3d& rate, const Vector3d& force, double dt);
 
-/// Υ <- Φ_dt(Υ) Υ_step, with the sensitivities. `rate_density`, `force_density`: white noise, unit/sqrt(Hz).
-void accumulate(ImuIncrement& increment, const ImuStep& step, double dt, double rate_density,
-                double force_density);
+/// Υ <- Φ_dt(Υ) Υ_step, with the sensitivities. `rate_power`, `force_power`: white noise per axis, unit²/Hz.
+void accumulate(ImuIncrement& increment, const ImuStep& step, double dt, const Vector3d& rate_power,
+                const Vector3d& force_power);
 
 }  // namespace pade::navigation

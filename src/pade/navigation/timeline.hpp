@@ -89,6 +89,7 @@ void Timeline::advance(Filter& filter, Time to, bool record, AfterSample after_s
       if (record) m.innovation = innovation;
     } else if (has_sample) {
       step(filter, imu[sample].time, sample, to);
+      filter.observe(imu[sample]);
       ++sample;
       // A measurement of the same stamp comes first in the order above, so the state is complete here.
       after_sample();
