@@ -43,6 +43,7 @@ struct MapArguments {
   std::optional<Order> order;
   std::optional<int> window, step;
   std::optional<double> range, voxel, map_range;
+  std::optional<navigation::ImuClass> imu;
 };
 
 template <class T>
@@ -84,6 +85,7 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.poses, arguments.poses);
   set(options.sequence.calibration, arguments.calibration);
   set(options.sequence.world_up, arguments.world_up);
+  set(options.imu, arguments.imu);
   options.sequence.strict = options.sequence.strict || arguments.strict;
   options.pcd = options.pcd || arguments.pcd;
   options.report = options.report && !arguments.no_report;
@@ -95,7 +97,7 @@ Result<MapResult> map(const MapArguments& arguments) {
   if (!options) return options.error();
   const auto stacks = io::ImageStacks::parse(arguments.save);
   if (!stacks) return stacks.error();
-  const auto sequence = io::Sequence::open(arguments.sequence, options->sequence);
+  const auto sequence = open_sequence(arguments.sequence, *options);
   if (!sequence) return sequence.error();
   io::RunWriterOptions output;
   output.overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
@@ -210,7 +212,11 @@ void add_map(CLI::App& app, Context& context) {
   map->add_option("sequence", a->sequence, "folder of the recorded flight")->required();
   map->add_option("-o,--out", a->out, "folder of the run, made by this command")->required();
   add_pipeline_options(*map, *a);
-  map->add_option("--poses", a->poses, "groundtruth (default), original, or a pose file (TUM)");
+  map->add_option(
+      "--poses", a->poses,
+      "groundtruth (default), original, from-imu-gnss (imu.csv and gnss.csv through the navigation\n"
+      "filter), or a pose file (TUM)");
+  add_enum(*map, "--imu", a->imu, "class of the IMU, for --poses from-imu-gnss (default industrial)");
   map->add_option("--calibration", a->calibration, "calibration file instead of the sequence's own");
   map->add_option("--world-up", a->world_up, "axis of the pose world that points up: +x -x +y -y +z -z");
   map->add_option("--save", a->save, "image stacks to write: any of depth,sigma,state,flow");

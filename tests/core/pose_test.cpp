@@ -80,5 +80,34 @@ TEST(RelativeMotion, ALeverArmTurnsYawIntoSidewaysMotionOfTheCamera) {
   EXPECT_NEAR(motion.rotation_vector().y(), -0.02, 1e-12);                  // about camera y (down)
 }
 
+TEST(RelativeMotion, ReversedHasTheCovarianceThatItsErrorsHave) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const Pose T = random_pose(random, 0.5);
+  RelativeMotion motion;
+  motion.R_reference_other = T.matrix3();
+  motion.t_reference_other = T.translation;
+  motion.duration = 0.1;
+  const Matrix6d root = 1e-3 * Matrix6d::NullaryExpr([&](auto, auto) { return normal(random); });
+  motion.covariance = root * root.transpose();
+  const RelativeMotion back = reversed(motion);
+  EXPECT_LT((back.t_reference_other - T.inverse().translation).norm(), 1e-12);
+  EXPECT_LT((back.R_reference_other - T.inverse().matrix3()).norm(), 1e-12);
+  EXPECT_EQ(back.duration, -0.1);
+  Matrix6d sampled = Matrix6d::Zero();
+  constexpr int kRuns = 20000;
+  for (int run = 0; run < kRuns; ++run) {
+    using Vector6d = Eigen::Matrix<double, 6, 1>;
+    const Vector6d e = root * Vector6d::NullaryExpr([&](auto) { return normal(random); });
+    const Pose wrong = Pose{rotation_exp(e.tail<3>()) * T.rotation, T.translation + e.head<3>()}.inverse();
+    Vector6d error;
+    error << wrong.translation - back.t_reference_other,
+        rotation_log(Eigen::Matrix3d(wrong.matrix3() * back.R_reference_other.transpose()));
+    sampled += error * error.transpose() / kRuns;
+  }
+  EXPECT_LT((sampled - back.covariance).norm(), 0.03 * back.covariance.norm());
+  EXPECT_LT((reversed(back).covariance - motion.covariance).norm(), 1e-12 * motion.covariance.norm() + 1e-18);
+}
+
 }  // namespace
 }  // namespace pade

@@ -95,7 +95,8 @@ TEST(Filter, GrowsItsDoubtWithTheVibration) {
       const Vector3d force = Vector3d(0, 0, 9.8) + (k == 0 ? 0.1 : 4.0) * random.normal3();
       filter.propagate(at(0.005 * i), Vector3d::Zero(), force, Vector3d::Zero());
       filter.observe({at(0.005 * i), Vector3d::Zero(), force});
-      if (i % 40 == 0) filter.update(GnssVelocity{at(0.005 * i), filter.state().X.v, 2.5e-3 * Matrix3d::Identity()});
+      if (i % 40 == 0)
+        filter.update(GnssVelocity{at(0.005 * i), filter.state().X.v, 2.5e-3 * Matrix3d::Identity()});
     }
     sigma[k] = std::sqrt(filter.covariance()(kNu, kNu));
   }
@@ -156,7 +157,11 @@ TEST(Filter, RelativeCovarianceMatchesManyRunsWithErrorsDrawnFromTheStartingCova
   const int clone = reference.clone();
   fly(reference, 0.5);
   const CloneMotion motion = reference.motion_since(clone);
-  Filter noiseless_model(FilterOptions{.gyroscope_noise = 0, .accelerometer_noise = 0, .gyroscope_vibration = 0, .accelerometer_vibration = 0}, kLever);
+  Filter noiseless_model(FilterOptions{.gyroscope_noise = 0,
+                                       .accelerometer_noise = 0,
+                                       .gyroscope_vibration = 0,
+                                       .accelerometer_vibration = 0},
+                         kLever);
   noiseless_model.start(NavigationState{}, loose_covariance());
   fly(noiseless_model, 0.2);
   noiseless_model.clone();

@@ -71,6 +71,14 @@ Prediction<3> padded(const Prediction<1>& scalar) {
   return y;
 }
 
+Prediction<3> padded(const Prediction<2>& pair) {
+  Prediction<3> y;
+  y.value << pair.value, 0;
+  y.H.setZero();
+  y.H.topRows<2>() = pair.H;
+  return y;
+}
+
 class EveryMeasurementModel : public testing::TestWithParam<Model> {};
 
 TEST_P(EveryMeasurementModel, HasTheJacobianOfItsOwnPrediction) {
@@ -96,6 +104,7 @@ INSTANTIATE_TEST_SUITE_P(
         Model{"GnssPosition", [](const NavigationState& s) { return predict_gnss_position(s, kLever); }},
         Model{"GnssVelocity", [](const NavigationState& s) { return predict_gnss_velocity(s, kLever); }},
         Model{"Velocity", [](const NavigationState& s) { return predict_velocity(s); }},
+        Model{"RoadMotion", [](const NavigationState& s) { return padded(predict_road_motion(s)); }},
         Model{"StaticForce", [](const NavigationState& s) { return predict_static_force(s, 9.8); }},
         Model{"BarometricHeight",
               [](const NavigationState& s) { return padded(predict_barometric_height(s)); }},
@@ -214,7 +223,8 @@ TEST(ImuIncrement, NoiseHasTheCovarianceOfManyNoisyRuns) {
   const Sequence clean(random, 20);
   const double rate_density = 0.01;
   const double force_density = 0.1;
-  const ImuIncrement increment = clean.accumulated(Vector6d::Zero(), rate_density * rate_density, force_density * force_density);
+  const ImuIncrement increment =
+      clean.accumulated(Vector6d::Zero(), rate_density * rate_density, force_density * force_density);
   const ExtendedPose end = moved(ExtendedPose{}, increment);
   const Eigen::LLT<Matrix9d> factor(increment.noise);
   const int runs = 4000;

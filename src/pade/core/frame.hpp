@@ -13,6 +13,9 @@ struct Frame {
   Time time;
   cv::Mat image;        ///< CV_8UC1 (grey) or CV_8UC3 (BGR)
   Pose T_world_camera;  ///< camera x right, y down, z forward; metres
+  /// Of the motion from the frame before to this one, as RelativeMotion has it with the one before as
+  /// reference; zero = exact.
+  Matrix6d motion_covariance = Matrix6d::Zero();
 };
 
 }  // namespace pade

@@ -57,6 +57,12 @@ struct ZeroVelocity {
   double sigma = 0.02;  ///< per axis, m/s
 };
 
+/// A vehicle on wheels moves along its x axis: no part of the velocity points to its side or off the road.
+struct RoadMotion {
+  Time time;
+  double sigma = 0.2;  ///< per axis, m/s; what the wheels slip and the springs move
+};
+
 /// Distance along body -z to level ground.
 struct RangeToGround {
   Time time;

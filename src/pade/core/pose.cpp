@@ -61,6 +61,20 @@ Pose interpolate(const Pose& a, const Pose& b, double s) {
   return a * Pose{rotation_exp(s * phi), left_jacobian(s * phi) * (s * rho)};
 }
 
+RelativeMotion reversed(const RelativeMotion& motion) {
+  // t' = -R^T t and R' = R^T: dt' = -R^T (dt + t x dθ), dθ' = -R^T dθ.
+  RelativeMotion reverse;
+  const Eigen::Matrix3d Rt = motion.R_reference_other.transpose();
+  reverse.R_reference_other = Rt;
+  reverse.t_reference_other = -Rt * motion.t_reference_other;
+  reverse.duration = -motion.duration;
+  Matrix6d J = Matrix6d::Zero();
+  J.topLeftCorner<3, 3>() = J.bottomRightCorner<3, 3>() = -Rt;
+  J.topRightCorner<3, 3>() = -Rt * skew(motion.t_reference_other);
+  reverse.covariance = J * motion.covariance * J.transpose();
+  return reverse;
+}
+
 RelativeMotion relative_motion(const Pose& T_world_reference, const Pose& T_world_other, double duration) {
   const Pose T_reference_other = T_world_reference.inverse() * T_world_other;
   RelativeMotion motion;

@@ -53,6 +53,9 @@ struct RelativeMotion {
 /// Relative motion from two poses T_world_camera (method: errata 2 and 3 of the paper's Section 2.2).
 RelativeMotion relative_motion(const Pose& T_world_reference, const Pose& T_world_other, double duration);
 
+/// The same motion seen from the other frame, with its covariance to first order.
+RelativeMotion reversed(const RelativeMotion& motion);
+
 /// T_world_camera of a camera that is mounted on a body: T_world_body * T_body_camera. `T_body_camera` holds
 /// the lever arm (translation, body axes) and the camera-to-body rotation.
 inline Pose camera_pose(const Pose& T_world_body, const Pose& T_body_camera) {

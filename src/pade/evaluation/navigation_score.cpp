@@ -34,8 +34,11 @@ std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vec
   error.t2 = estimate.t2;
   const Eigen::Vector3d difference = estimate.motion.t_reference_other - T.translation;
   error.translation = difference.norm();
-  error.rotation =
-      rotation_log(Eigen::Matrix3d(estimate.motion.R_reference_other.transpose() * T.matrix3())).norm();
+  // exp(dθ) R = R_true, in the axes of the reference, as the covariance has it.
+  const Eigen::Vector3d turn =
+      rotation_log(Eigen::Matrix3d(T.matrix3() * estimate.motion.R_reference_other.transpose()));
+  error.rotation = turn.norm();
+  error.rotation_nees = turn.dot(estimate.motion.covariance.bottomRightCorner<3, 3>().ldlt().solve(turn));
   error.baseline = T.translation.norm();
   error.estimated_baseline = estimate.motion.t_reference_other.norm();
   error.sigma = std::sqrt(estimate.motion.covariance.topLeftCorner<3, 3>().trace());
@@ -58,6 +61,7 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
   std::vector<double> relative;
   std::vector<double> rotation;
   double nees = 0;
+  double rotation_nees = 0;
   std::size_t good = 0;
   std::size_t good_valid = 0;
   std::size_t bad = 0;
@@ -67,6 +71,7 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
     rotation.push_back(error.rotation);
     if (error.baseline > 0) relative.push_back(error.translation / error.baseline);
     nees += error.nees;
+    rotation_nees += error.rotation_nees;
     if (error.translation < 0.1 * error.baseline) {
       ++good;
       good_valid += error.scale_valid ? 1 : 0;
@@ -85,8 +90,10 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
   summary.translation_95 = quantile(translation, 0.95);
   summary.relative_median = quantile(relative, 0.5);
   summary.rotation_95 = quantile(rotation, 0.95);
-  summary.nees_mean =
-      errors.empty() ? std::numeric_limits<double>::quiet_NaN() : nees / static_cast<double>(errors.size());
+  const double count =
+      errors.empty() ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(errors.size());
+  summary.nees_mean = nees / count;
+  summary.rotation_nees_mean = rotation_nees / count;
   summary.valid_where_good = share(good_valid, good);
   summary.invalid_where_bad = share(bad_invalid, bad);
   return summary;

@@ -31,6 +31,7 @@ struct MotionError {
   double estimated_baseline = 0;  ///< m
   double sigma = 0;               ///< predicted: root of the trace of the translation's covariance, m
   double nees = 0;                ///< normalised error squared of the translation, 3 degrees of freedom
+  double rotation_nees = 0;       ///< the same of the rotation
   bool scale_valid = false;
 };
 
@@ -45,7 +46,8 @@ struct MotionSummary {
   double translation_95 = 0;      ///< m
   double relative_median = 0;     ///< error over true baseline
   double rotation_95 = 0;         ///< rad
-  double nees_mean = 0;
+  double nees_mean = 0;           ///< of the translation, 3 expected
+  double rotation_nees_mean = 0;  ///< 3 expected
   double valid_where_good =
       0;  ///< share of the pairs with an error under 10 % of the baseline that are scale_valid
   double invalid_where_bad = 0;  ///< share of the pairs with an error over 20 % that are not

@@ -141,6 +141,7 @@ Result<SequenceListing> read_euroc_layout(const fs::path& folder, const LayoutCh
   if (!text) return text.error();
   listing.images = parse_euroc_images(*text, camera / "data.csv", report);
 
+  if (choice.computed) return listing;
   auto trajectory = choose_poses(mav, choice.poses, listing.pose_file, report);
   if (!trajectory) return trajectory.error();
   listing.trajectory = std::move(*trajectory);

@@ -160,6 +160,7 @@ Result<SequenceListing> read_kitti_layout(const fs::path& folder, const LayoutCh
   if (!times) return times.error();
   listing.images = stamped_images(folder / fmt::format("image_{}", camera), *times, report);
 
+  if (choice.computed) return listing;
   if (choice.poses == "original") {
     return Error{fmt::format(
         "{}: the KITTI layout has no original poses, expected groundtruth or a pose file", folder.string())};

@@ -9,6 +9,7 @@
 
 #include "pade/io/navigation_log.hpp"
 #include "pade/io/text.hpp"
+#include "pade/io/trajectory.hpp"
 
 namespace pade::io {
 namespace {
@@ -92,10 +93,30 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   auto magnetometer = read_optional(folder / "mag.csv", parse_magnetometer, log.remarks);
   if (!magnetometer) return magnetometer.error();
   log.magnetometer = std::move(*magnetometer);
-  auto states = read_optional(truth, parse_truth, log.remarks);
+  const bool simulated = !fs::exists(truth) && fs::exists(folder / "body_truth.txt");
+  auto states = simulated ? read_optional(folder / "body_truth.txt", parse_body_truth, log.remarks)
+                          : read_optional(truth, parse_truth, log.remarks);
   if (!states) return states.error();
   log.truth = std::move(*states);
   return log;
+}
+
+Result<std::vector<TrueState>> parse_body_truth(std::string_view text, std::string_view name,
+                                                std::vector<std::string>& remarks) {
+  ReadReport report;
+  const auto trajectory = parse_trajectory(text, std::string(name), report);
+  if (!trajectory) return trajectory.error();
+  for (const Skipped& row : report.skipped) remarks.push_back(row.file + ": " + row.reason);
+  const auto& rows = trajectory->rows();
+  std::vector<TrueState> states;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const StampedPose& before = rows[i > 0 ? i - 1 : i];
+    const StampedPose& after = rows[std::min(i + 1, rows.size() - 1)];
+    const double interval = std::max(seconds_between(before.time, after.time), 1e-9);
+    states.push_back(
+        {rows[i].time, rows[i].pose, (after.pose.translation - before.pose.translation) / interval});
+  }
+  return states;
 }
 
 std::string format_imu(const std::vector<ImuSample>& samples) {

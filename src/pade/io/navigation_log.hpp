@@ -49,6 +49,10 @@ Result<std::vector<MagneticField>> parse_magnetometer(std::string_view text, std
 Result<std::vector<TrueState>> parse_truth(std::string_view text, std::string_view name,
                                            std::vector<std::string>& remarks);
 
+/// body_truth.txt of a simulated flight: TUM rows T_world_body. Velocities are central differences.
+Result<std::vector<TrueState>> parse_body_truth(std::string_view text, std::string_view name,
+                                                std::vector<std::string>& remarks);
+
 /// Camera-frame stamps, one per line (first column, seconds); a heading and '#' lines are passed over.
 Result<std::vector<Time>> parse_stamps(std::string_view text, std::string_view name);
 
@@ -57,9 +61,9 @@ struct NavigationLogOptions {
   GnssDefaults gnss_defaults;
 };
 
-/// Reads a log folder: our layout or a recording (imu.csv, gnss*.csv, baro.csv, mag.csv, truth.csv), EuRoC
-/// (mav0/imu0/data.csv ...), or VectorNav (*-imu.csv, *-gnss.csv). Errors: no IMU file, several GNSS files
-/// and none chosen, or a file unusable as a whole.
+/// Reads a log folder: our layout or a recording (imu.csv, gnss*.csv, baro.csv, mag.csv, truth.csv or
+/// body_truth.txt), EuRoC (mav0/imu0/data.csv ...), or VectorNav (*-imu.csv, *-gnss.csv). Errors: no IMU
+/// file, several GNSS files and none chosen, or a file unusable as a whole.
 Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
                                           const NavigationLogOptions& options = {});
 

@@ -25,6 +25,7 @@ struct FrameEntry {
   Time time;
   fs::path image;
   Pose T_world_camera;
+  Matrix6d motion_covariance = Matrix6d::Zero();
   fs::path depth;  ///< empty = no truth
 };
 
@@ -78,7 +79,7 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, cons
                                       const Camera& camera, int bits, double largest_gap,
                                       ReadReport& report) {
   const Calibration& calibration = listing.calibration;
-  const Time offset = Time::from_seconds(calibration.time_offset_s.value_or(0));
+  const Time offset = Time::from_seconds(listing.computed ? 0 : calibration.time_offset_s.value_or(0));
   std::vector<FrameEntry> frames;
   for (const auto& [source, info] : images) {
     const std::string file = source.file.string();
@@ -98,9 +99,29 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, cons
     }
     const Pose T_world_camera =
         listing.poses_of_body ? camera_pose(*pose, *calibration.T_body_camera) : *pose;
-    frames.push_back({source.time, source.file, T_world_camera, {}});
+    FrameEntry frame{source.time, source.file, T_world_camera, Matrix6d::Zero(), {}};
+    if (const auto known = listing.covariances.find(source.time); known != listing.covariances.end()) {
+      frame.motion_covariance = known->second;
+    }
+    frames.push_back(std::move(frame));
   }
   return frames;
+}
+
+/// Fills the listing's trajectory from a source of poses.
+Status compute_poses(const PoseSource& source, const fs::path& folder, const std::vector<Candidate>& images,
+                     SequenceListing& listing, ReadReport& report) {
+  std::vector<Time> times;
+  for (const Candidate& image : images) times.push_back(image.source.time);
+  auto computed = source(folder, times, listing.calibration);
+  if (!computed) return computed.error();
+  for (std::size_t i = 0; i < computed->poses.size(); ++i) {
+    listing.covariances[computed->poses[i].time] = computed->covariances[i];
+  }
+  listing.trajectory = Trajectory(std::move(computed->poses));
+  listing.computed = true;
+  report.notes.insert(report.notes.end(), computed->notes.begin(), computed->notes.end());
+  return {};
 }
 
 /// Gives every frame the depth image nearest in time.
@@ -230,14 +251,14 @@ struct Sequence::Data {
   std::optional<WorldUp> up;
   std::optional<GeographicOrigin> origin;
 
-  Status choose_frames();
+  Status choose_frames(const PoseSource& source);
   Status make_mask();
   void choose_truth();
   void choose_world();
 };
 
 /// Camera and frames.
-Status Sequence::Data::choose_frames() {
+Status Sequence::Data::choose_frames(const PoseSource& source) {
   if (listing.images.empty()) {
     return Error{fmt::format("{}: no images found in the layout {}{}", folder.string(), listing.layout,
                              first_reason(report))};
@@ -263,6 +284,9 @@ Status Sequence::Data::choose_frames() {
   }
   if (kind.bits != 8 && kind.bits != 16) {
     return Error{fmt::format("{}: the images have {} bits, expected 8 or 16", folder.string(), kind.bits)};
+  }
+  if (source) {
+    if (Status status = compute_poses(source, folder, images, listing, report); !status) return status;
   }
   frames = usable_frames(images, listing, raw_camera, kind.bits, options.largest_pose_gap, report);
   if (auto enough = enough_usable(frames.size(), listing.images.size(), report, folder); !enough)
@@ -304,6 +328,8 @@ void Sequence::Data::choose_truth() {
 void Sequence::Data::choose_world() {
   if (!options.world_up.empty()) {
     up = WorldUp{*parse_direction(options.world_up), true, "command line"};
+  } else if (listing.computed) {
+    up = WorldUp{Eigen::Vector3d::UnitZ(), true, "east-north-up of the GNSS"};
   } else if (listing.calibration.world_up) {
     up = WorldUp{*listing.calibration.world_up, true, "camera.yaml"};
   } else if (listing.world_up) {
@@ -314,15 +340,17 @@ void Sequence::Data::choose_world() {
   origin = listing.calibration.origin ? listing.calibration.origin : gnss_origin(folder);
 }
 
-Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& options) {
+Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& options,
+                                const PoseSource& source) {
   if (auto good = check_options(options); !good) return good.error();
   auto data = std::make_unique<Data>();
   data->folder = folder;
   data->options = options;
-  auto listing = read_layout(folder, {options.poses, options.calibration}, data->report);
+  auto listing = read_layout(folder, {options.poses, options.calibration, source != nullptr}, data->report);
   if (!listing) return listing.error();
+  if (source) listing->pose_file = options.poses;
   data->listing = std::move(*listing);
-  if (auto good = data->choose_frames(); !good) return good.error();
+  if (auto good = data->choose_frames(source); !good) return good.error();
   if (auto good = data->make_mask(); !good) return good.error();
   data->choose_truth();
   data->choose_world();
@@ -357,7 +385,8 @@ Result<Frame> Sequence::frame(std::size_t i) const {
                              entry.image.string(), size_text(image->size()), 8 * image->elemSize1(),
                              size_text(data_->raw_camera.size()), data_->intensity.bits)};
   }
-  return Frame{entry.time, data_->undistorter(data_->intensity(*image)), entry.T_world_camera};
+  return Frame{entry.time, data_->undistorter(data_->intensity(*image)), entry.T_world_camera,
+               entry.motion_covariance};
 }
 
 bool Sequence::has_truth() const {

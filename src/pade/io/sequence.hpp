@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,7 +35,8 @@ struct SequenceOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("poses", self.poses, "groundtruth, original (groundtruth_original.txt) or a pose file");
+    field("poses", self.poses,
+          "groundtruth, original (groundtruth_original.txt), from-imu-gnss or a pose file");
     field("calibration", self.calibration, "calibration file to use instead of the sequence's own");
     field("world_up", self.world_up,
           "direction of the pose world that points up: +x, -x, +y, -y, +z, -z or \"x y z\"");
@@ -47,6 +49,16 @@ struct SequenceOptions {
   }
 };
 
+/// Poses that are computed instead of read.
+struct ComputedPoses {
+  std::vector<StampedPose> poses;     ///< T_world_camera at the times of the images that have a pose
+  std::vector<Matrix6d> covariances;  ///< Frame::motion_covariance of each
+  std::vector<std::string> notes;
+};
+/// Computes them from the times of the images, in order, and the calibration as stated.
+using PoseSource = std::function<Result<ComputedPoses>(
+    const std::filesystem::path& folder, const std::vector<Time>& images, const Calibration& calibration)>;
+
 /// Frames with poses, calibrated camera, mask and (where recorded) true depth. Immutable once open: every
 /// member may be called from several threads.
 class Sequence {
@@ -55,7 +67,9 @@ class Sequence {
   /// checked, and a few images are decoded for the mask and the intensity scaling. Refused: folder,
   /// calibration or poses that are unusable as a whole, fewer than 2 usable frames, more than half of the
   /// frames bad, and, with `strict`, anything skipped.
-  static Result<Sequence> open(const std::filesystem::path& folder, const SequenceOptions& options = {});
+  /// @param source  where given, the poses come from it, and `options.poses` is but its name.
+  static Result<Sequence> open(const std::filesystem::path& folder, const SequenceOptions& options = {},
+                               const PoseSource& source = {});
 
   Sequence(Sequence&&) noexcept;
   Sequence& operator=(Sequence&&) noexcept;

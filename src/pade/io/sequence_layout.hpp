@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,8 +26,10 @@ struct SequenceListing {
   std::vector<StampedFile> images;
   std::vector<StampedFile> depth;  ///< truth, may be empty
   std::filesystem::path pose_file;
-  Trajectory trajectory;       ///< T_world_camera or T_world_body
-  bool poses_of_body = false;  ///< T_body_camera of `calibration` is to be applied
+  Trajectory trajectory;                 ///< T_world_camera or T_world_body
+  bool poses_of_body = false;            ///< T_body_camera of `calibration` is to be applied
+  bool computed = false;                 ///< the trajectory is of the camera, at the times of the images
+  std::map<Time, Matrix6d> covariances;  ///< of computed poses: Frame::motion_covariance
   Calibration calibration;
   std::optional<WorldUp> world_up;  ///< where the layout itself prescribes it
 };
@@ -35,6 +38,7 @@ struct SequenceListing {
 struct LayoutChoice {
   std::string poses;                       ///< groundtruth, original or a file
   std::filesystem::path calibration_file;  ///< empty = the layout's own
+  bool computed = false;                   ///< the poses come from elsewhere: none are read
 };
 
 Result<SequenceListing> read_tum_layout(const std::filesystem::path& folder, const LayoutChoice& choice,

@@ -88,6 +88,7 @@ Result<SequenceListing> read_tum_layout(const fs::path& folder, const LayoutChoi
     listing.depth = std::move(*depth);
   }
 
+  if (choice.computed) return listing;
   listing.pose_file = pose_file(folder, choice.poses);
   auto trajectory = read_trajectory(listing.pose_file, report);
   if (!trajectory) return trajectory.error();

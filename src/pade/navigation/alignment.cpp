@@ -10,6 +10,7 @@ namespace {
 constexpr double kLookInterval = 0.1;      // s
 constexpr double kHopeless = 15;           // log-likelihood behind the best at which a hypothesis is dropped
 constexpr double kUnknownPosition = 1e4;   // m
+constexpr double kStartDistance = 5;       // flown between the fix and the start, m
 constexpr double kMotionTiltSigma = 0.08;  // of the first level in motion, rad
 constexpr double kMotionForceDoubt = 0.3;  // m/s²
 constexpr double kRestRateSigma = 2e-3;    // of the mean rate at rest, rad/s
@@ -232,6 +233,10 @@ void Alignment::begin_at_first_fix(const Timeline& timeline, Time until) {
     if (!hypothesis.alive) continue;
     FilterSnapshot snapshot = hypothesis.filter.snapshot();
     snapshot.state.X.p = fix->value;
+    // Nor must an almost unknown position meet a barometer: it would tie height to all that moves the
+    // horizon.
+    snapshot.P.block<3, 3>(kRho, kRho) =
+        (fix->covariance.trace() + kStartDistance * kStartDistance) * Matrix3d::Identity();
     hypothesis.filter.restore(snapshot);
   }
 }

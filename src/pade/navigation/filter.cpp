@@ -7,11 +7,12 @@
 namespace pade::navigation {
 namespace {
 
-constexpr double kSmoothTime = 2.0;     // s
-constexpr double kVibrationTime = 1.0;  // over which the level of vibration is averaged, s
+constexpr double kSmoothTime = 2.0;            // s
+constexpr double kVibrationTime = 1.0;         // over which the level of vibration is averaged, s
 constexpr double kLargestRateVariance = 1;     // what is more is a fault, (rad/s)²
 constexpr double kLargestForceVariance = 400;  // (m/s²)²
-constexpr int kLeastRejections = 3;  // in a row, before a sensor is believed against the filter
+constexpr double kAxleDistance = 1.0;          // m
+constexpr int kLeastRejections = 3;            // in a row, before a sensor is believed against the filter
 
 double wrap_angle(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
 
@@ -349,8 +350,16 @@ Innovation Filter::update(const MagneticField& field, double declination) {
   const Eigen::Matrix<double, 1, 1> residual(wrap_angle(north - prediction->value[0]));
   // The azimuth hangs on the horizontal part of the field alone.
   const Vector3d world = core_.state.X.R * field.field;
-  const double sigma = std::max(field.sigma, 1e-3) * world.norm() / world.head<2>().norm();
-  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
+  const double white = std::max(field.sigma, 1e-3) * world.norm() / world.head<2>().norm();
+  // The vehicle's iron errs the same way for a long time τ: samples dt apart weigh as white noise of the same
+  // density at zero frequency, 2 τ σ²; before that, the n-th by n² σ², so that all together tell what one
+  // does.
+  const double dt = std::max(seconds_between(core_.magnetometer_used, core_.state.time), 1e-3);
+  const double count = ++core_.magnetometer_uses;
+  const double repeats = std::min(std::max(1.0, 2 * options_.compass_correlation_time / dt), count * count);
+  const double variance = white * white + repeats * options_.compass_bias_sigma * options_.compass_bias_sigma;
+  core_.magnetometer_used = core_.state.time;
+  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(variance),
                     options_.gate_probability_1);
 }
 
@@ -362,6 +371,16 @@ Innovation Filter::update(const RangeToGround& range) {
   const double sigma = std::max(range.sigma, 0.005);
   return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
                     options_.gate_probability_1);
+}
+
+Innovation Filter::update(const RoadMotion& road) {
+  flush();
+  const Prediction<2> prediction = predict_road_motion(core_.state);
+  // The point that does not slip is the rear axle, an unknown distance of about a metre away.
+  const double swing = kAxleDistance * core_.state.angular_rate.norm();
+  const double sigma = std::hypot(std::max(road.sigma, 0.01), swing);
+  return correct<2>(prediction, -prediction.value, sigma * sigma * Eigen::Matrix2d::Identity(),
+                    options_.gate_probability_2);
 }
 
 Innovation Filter::update_static_force(const Vector3d& force, double sigma) {

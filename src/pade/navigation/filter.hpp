@@ -45,13 +45,13 @@ struct GnssErrorClass {
   double correlation_time = 0;  ///< 0: no bias known yet
 };
 
-/// How much the samples of an axis differ from a smooth motion: rotor and engine vibration, which aliases into
-/// the band of the motion.
+/// How much the samples of an axis differ from a smooth motion: rotor and engine vibration, which aliases
+/// into the band of the motion.
 struct Vibration {
   ImuSample last;
   ImuSample before_last;
-  double interval = 0.005;                                    ///< between samples, s
-  Vector3d rate_variance = Vector3d::Constant(1e-4);  ///< (rad/s)²
+  double interval = 0.005;                             ///< between samples, s
+  Vector3d rate_variance = Vector3d::Constant(1e-4);   ///< (rad/s)²
   Vector3d force_variance = Vector3d::Constant(0.25);  ///< (m/s²)²
   int samples = 0;
 
@@ -69,7 +69,9 @@ struct FilterCore {
   Vector3d smooth_rotation = Vector3d::Zero();  ///< R_smooth = Exp(smooth_rotation) R, decaying
   Time position_accepted;                       ///< last time a position passed its gate
   Time velocity_accepted;                       ///< last time a velocity did
-  bool velocity_seen = false;                   ///< one has since the start
+  Time magnetometer_used;                       ///< last time an azimuth was
+  int magnetometer_uses = 0;
+  bool velocity_seen = false;   ///< one has since the start
   double log_likelihood = 0;    ///< of all GNSS innovations since the start, bounded per innovation
   int position_rejections = 0;  ///< in a row
   int velocity_rejections = 0;
@@ -120,6 +122,7 @@ class Filter {
   Innovation update(const MagneticField& field, double declination);
   Innovation update(const ZeroVelocity& stop);
   Innovation update(const RangeToGround& range);
+  Innovation update(const RoadMotion& road);
   /// Levelling: the mean specific force of a body known to be unaccelerated.
   Innovation update_static_force(const Vector3d& force, double sigma);
 

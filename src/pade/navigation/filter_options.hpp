@@ -15,12 +15,13 @@ struct FilterOptions {
   double gravity = 9.80665;  ///< m/s², along world -z; the Earth's rate is below the noise of these sensors
 
   // White noise: a part that is always there (gyroscopes: the data sheet; accelerometers: what scale and
-  // alignment errors do in manoeuvres, far above the sheet), and what rotors and engines add. That is measured:
-  // white samples of spread s and interval dt have the density s sqrt(dt); vibration has this share of it.
-  double gyroscope_noise = 2.4e-4;          ///< rad/s/sqrt(Hz)
-  double accelerometer_noise = 2e-2;        ///< m/s²/sqrt(Hz)
-  double gyroscope_vibration = 0.15;        ///< share
-  double accelerometer_vibration = 0.35;    ///< share
+  // alignment errors do in manoeuvres, far above the sheet), and what rotors and engines add. That is
+  // measured: white samples of spread s and interval dt have the density s sqrt(dt); vibration has this share
+  // of it.
+  double gyroscope_noise = 2.4e-4;        ///< rad/s/sqrt(Hz)
+  double accelerometer_noise = 2e-2;      ///< m/s²/sqrt(Hz)
+  double gyroscope_vibration = 0.15;      ///< share
+  double accelerometer_vibration = 0.35;  ///< share
   double gyroscope_bias_walk = 2e-4;      ///< rad/s/sqrt(s)
   double accelerometer_bias_walk = 1e-3;  ///< m/s²/sqrt(s)
   double gyroscope_bias_sigma = 0.05;     ///< before the first levelling, rad/s
@@ -45,8 +46,12 @@ struct FilterOptions {
   double barometer_bias_sigma = 20;          ///< of its unknown zero, m
   double barometer_correlation_time = 3000;  ///< s
 
+  double compass_bias_sigma = 0.08;       ///< of a magnetic azimuth: iron of the vehicle, rad
+  double compass_correlation_time = 100;  ///< s
+
   // Robustness.
   double gate_probability_3 = 16.27;  ///< chi-square bound of 3 degrees of freedom (99.9 %)
+  double gate_probability_2 = 13.82;  ///< of 2 degrees of freedom
   double gate_probability_1 = 10.83;  ///< of 1 degree of freedom
   double soft_gate = 3;  ///< up to this multiple of the bound a measurement is kept with inflated noise
   double reacquire_after = 1.0;  ///< seconds of nothing but rejections after which the sensor is believed
@@ -81,7 +86,10 @@ struct FilterOptions {
     field("velocity_sigma_floor", self.velocity_sigma_floor, "least sigma of a velocity, m/s");
     field("barometer_bias_sigma", self.barometer_bias_sigma, "of the barometer's zero, m");
     field("barometer_correlation_time", self.barometer_correlation_time, "of the barometer's zero, s");
+    field("compass_bias_sigma", self.compass_bias_sigma, "of a magnetic azimuth, rad");
+    field("compass_correlation_time", self.compass_correlation_time, "of its error, s");
     field("gate_probability_3", self.gate_probability_3, "chi-square gate, 3 degrees of freedom");
+    field("gate_probability_2", self.gate_probability_2, "chi-square gate, 2 degrees of freedom");
     field("gate_probability_1", self.gate_probability_1, "chi-square gate, 1 degree of freedom");
     field("soft_gate", self.soft_gate, "multiple of the gate up to which noise is inflated instead");
     field("reacquire_after", self.reacquire_after, "seconds of rejections before a sensor is believed again");

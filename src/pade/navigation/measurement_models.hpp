@@ -45,7 +45,18 @@ inline Prediction<3> predict_velocity(const NavigationState& state) {
   return predict_gnss_velocity(state, Vector3d::Zero());
 }
 
-/// Barometric height: p_z + b_h.
+/// Velocity to the side and upwards in the body frame, (R^T v)_yz.
+inline Prediction<2> predict_road_motion(const NavigationState& state) {
+  const Vector3d u = state.X.R.conjugate() * state.X.v;
+  Prediction<2> y;
+  y.value = u.tail<2>();
+  y.H.setZero();
+  y.H.middleCols<3>(kPhi) = skew(u).bottomRows<2>();
+  y.H.middleCols<3>(kNu) = Matrix3d::Identity().bottomRows<2>();
+  return y;
+}
+
+/// Barometric height: p_z + b_h.h.
 inline Prediction<1> predict_barometric_height(const NavigationState& state) {
   Prediction<1> y;
   y.value[0] = state.X.p.z() + state.height_bias;

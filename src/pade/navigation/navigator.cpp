@@ -124,6 +124,8 @@ void Navigator::add(const RangeToGround& m) {
   add(Measurement(m), 0, std::isfinite(m.range) && std::isfinite(m.sigma) && std::isfinite(m.ground_height));
 }
 
+void Navigator::add(const RoadMotion& m) { add(Measurement(m), 0, std::isfinite(m.sigma)); }
+
 void Navigator::retire(Time before) {
   while (!timeline_.measurements.empty() && timeline_.measurements.front().time < before) {
     if (sink_) sink_(timeline_.measurements.front());

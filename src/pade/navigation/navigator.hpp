@@ -33,7 +33,7 @@ struct NavigatorOptions {
   double dead_reckoning_after = 1;             ///< seconds without GNSS velocity
   double longest_gap = 3;                      ///< without IMU data; beyond it the filter starts anew, s
   double scale_error_limit = 0.2;              ///< of the baseline: the noise bound of the paper
-  double scale_error_sigmas = 1.75;            ///< `scale_valid` asks for limit * baseline > this * sigma
+  double scale_error_sigmas = 1.68;            ///< `scale_valid` asks for limit * baseline > this * sigma
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -118,6 +118,7 @@ class Navigator {
   void add(const MagneticField& field);
   void add(const ZeroVelocity& stop);
   void add(const RangeToGround& range);
+  void add(const RoadMotion& road);
 
   /// Motion of the camera from image time t1 to image time t2 (t2 >= t1), from a clone at t1 within a replay
   /// that ends at t2: nothing stamped after t2 is used, however late the question comes.

@@ -39,6 +39,7 @@ void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions&
   std::stable_sort(arrivals.begin(), arrivals.begin() + static_cast<std::ptrdiff_t>(aiding),
                    [](const Arrival& a, const Arrival& b) { return a.time < b.time; });
 
+  Time last_road = log.imu.empty() ? Time{} : log.imu.front().time;
   std::size_t next = 0;
   const auto play_aiding = [&](Time until) {
     for (; next < aiding && arrivals[next].time <= until; ++next) {
@@ -66,6 +67,10 @@ void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions&
   };
   for (std::size_t k = aiding; k < arrivals.size(); ++k) {
     play_aiding(arrivals[k].time);
+    if (options.road_rate > 0 && seconds_between(last_road, arrivals[k].time) >= 1 / options.road_rate) {
+      last_road = arrivals[k].time;
+      navigator.add(RoadMotion{last_road});
+    }
     navigator.add(log.imu[arrivals[k].index]);
     if (after_imu) after_imu(arrivals[k].time);
   }

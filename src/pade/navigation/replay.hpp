@@ -17,6 +17,7 @@ struct ReplayOptions {
   double gnss_delay_high = 0;     ///< (so that messages overtake each other), s
   std::uint64_t seed = 1;         ///< of the delays
   std::vector<Heading> headings;  ///< further measurements
+  double road_rate = 0;           ///< RoadMotion so many times a second: a vehicle on wheels, Hz
 };
 
 /// Calls `after_imu(stamp)` behind each IMU sample. At one moment aiding data arrives before the IMU sample.

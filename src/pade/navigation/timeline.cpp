@@ -16,6 +16,8 @@ Innovation apply(Filter& filter, const Measurement& m, double declination) {
       return filter.update(MagneticField{m.time, m.value, m.sigma}, declination);
     case SensorKind::zero_velocity:
       return filter.update(ZeroVelocity{m.time, m.sigma});
+    case SensorKind::road:
+      return filter.update(RoadMotion{m.time, m.sigma});
     case SensorKind::range:
       return filter.update(RangeToGround{m.time, m.value.x(), m.sigma, m.extra});
   }

@@ -19,7 +19,8 @@ enum class SensorKind : std::uint8_t {
   heading,
   magnetometer,
   zero_velocity,
-  range
+  range,
+  road
 };
 
 /// A measurement of any kind.
@@ -46,6 +47,7 @@ struct Measurement {
       : time(m.time), kind(SensorKind::zero_velocity), sigma(m.sigma) {}
   explicit Measurement(const RangeToGround& m)
       : time(m.time), kind(SensorKind::range), value(m.range, 0, 0), sigma(m.sigma), extra(m.ground_height) {}
+  explicit Measurement(const RoadMotion& m) : time(m.time), kind(SensorKind::road), sigma(m.sigma) {}
 };
 
 /// Uses one measurement in the filter.

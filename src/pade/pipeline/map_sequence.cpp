@@ -15,6 +15,7 @@
 #include "pade/io/cloud_files.hpp"
 #include "pade/io/map_files.hpp"
 #include "pade/io/options_json.hpp"
+#include "pade/pipeline/navigation_run.hpp"
 
 namespace pade {
 namespace {
@@ -85,7 +86,8 @@ class Run {
     truths_[frame.time] = std::move(loaded.truth);
     while (truths_.size() > step() + 1) truths_.erase(truths_.begin());
 
-    const MapperUpdate& update = mapper_.add(frame.image, frame.time, frame.T_world_camera);
+    const MapperUpdate& update =
+        mapper_.add(frame.image, frame.time, frame.T_world_camera, frame.motion_covariance);
     if (update.outcome == MapperUpdate::Outcome::skipped) {
       undecodable_.push_back({sequence_.image_file(i).string(), update.reason});
       return sequence_.check(undecodable_.size());
@@ -206,6 +208,13 @@ class Run {
 };
 
 }  // namespace
+
+Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options) {
+  if (options.sequence.poses != poses_from_sensors) return io::Sequence::open(folder, options.sequence);
+  navigation::NavigatorOptions navigator;
+  navigator.filter = navigation::FilterOptions::of(options.imu);
+  return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(navigator));
+}
 
 Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,
                                io::RunWriter& writer, int threads,

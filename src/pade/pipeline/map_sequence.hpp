@@ -1,6 +1,7 @@
 // A recorded flight through the obstacle mapper into the folder of a run: what `pade map` does.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include "pade/io/run_writer.hpp"
 #include "pade/io/sequence.hpp"
 #include "pade/mapping/cloud_builder.hpp"
+#include "pade/navigation/filter_options.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 
 namespace pade {
@@ -18,6 +20,7 @@ namespace pade {
 struct MapSequenceOptions {
   ObstacleMapperOptions mapper;
   io::SequenceOptions sequence;
+  navigation::ImuClass imu = navigation::ImuClass::industrial;
   mapping::CloudOptions cloud;
   bool pcd = false;
   bool report = true;
@@ -26,11 +29,15 @@ struct MapSequenceOptions {
   static void visit(Self& self, Visitor&& field) {
     field("mapper", self.mapper, "the pipeline");
     field("sequence", self.sequence, "how the recording is read");
+    field("imu", self.imu, "industrial | consumer: class of the IMU where poses are from-imu-gnss");
     field("cloud", self.cloud, "the point cloud of the run");
     field("pcd", self.pcd, "also writes cloud.pcd");
     field("report", self.report, "writes report.html");
   }
 };
+
+/// Opens a sequence with the poses that the options ask for: read from a file, or from-imu-gnss.
+Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options);
 
 /// How far a run is.
 struct MapProgress {

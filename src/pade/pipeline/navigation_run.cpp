@@ -58,6 +58,7 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
   std::sort(frames.begin(), frames.end());
   navigation::ReplayOptions replay;
   if (options.heading) replay.headings.push_back(*options.heading);
+  if (options.on_road) replay.road_rate = 5;
 
   const auto offset = Time::from_seconds(options.navigator.camera_time_offset).nanoseconds;
   std::size_t next = 0;
@@ -123,6 +124,10 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
                                                          const navigation::NavigatorOptions& options) {
   const auto log = io::read_navigation_log(folder);
   if (!log) return log.error();
+  if (log->gnss.velocities.empty() || log->gnss.fixes.empty()) {
+    return Error{fmt::format("{}: no GNSS positions and velocities found, expected them in gnss.csv",
+                             folder.string())};
+  }
   NavigationRunOptions run_options;
   run_options.navigator = options;
   run_options.navigator.camera_time_offset = mounting.time_offset;
@@ -156,6 +161,36 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
                              folder.string(), frames.size(), to_name(run.health.status))};
   }
   return trajectory;
+}
+
+io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) {
+  return [options](const std::filesystem::path& folder, const std::vector<Time>& images,
+                   const io::Calibration& calibration) -> Result<io::ComputedPoses> {
+    if (!calibration.T_body_camera) {
+      return Error{
+          fmt::format("{}: field T_body_camera is missing in the calibration, expected it because the poses "
+                      "come from the "
+                      "body's sensors",
+                      folder.string())};
+    }
+    const CameraMounting mounting{*calibration.T_body_camera, calibration.time_offset_s.value_or(0),
+                                  calibration.gnss_lever_arm};
+    const auto trajectory = camera_trajectory_from_imu_gnss(folder, images, mounting, options);
+    if (!trajectory) return trajectory.error();
+    io::ComputedPoses result;
+    for (std::size_t i = 0; i < trajectory->times.size(); ++i) {
+      result.poses.push_back({trajectory->times[i], trajectory->poses[i]});
+      result.covariances.push_back(i > 0 ? trajectory->motions[i - 1].covariance : Matrix6d::Zero());
+    }
+    const auto doubtful = std::count(trajectory->scale_valid.begin(), trajectory->scale_valid.end(), false);
+    if (doubtful > 0) {
+      result.notes.push_back(
+          fmt::format("{} of {} motions between frames are too short for what the filter knows of them "
+                      "(scale_valid false)",
+                      doubtful, trajectory->scale_valid.size()));
+    }
+    return result;
+  };
 }
 
 }  // namespace pade

@@ -11,6 +11,7 @@
 #include "pade/core/result.hpp"
 #include "pade/evaluation/navigation_score.hpp"
 #include "pade/io/navigation_log.hpp"
+#include "pade/io/sequence.hpp"
 #include "pade/navigation/navigator.hpp"
 
 namespace pade {
@@ -21,6 +22,7 @@ struct NavigationRunOptions {
   double rate = 10;                ///< Hz
   Pose T_body_camera;              ///< of the motions; the trajectory is the body's
   std::optional<Heading> heading;  ///< a yaw known at the start
+  bool on_road = false;            ///< a vehicle on wheels, which moves along its x axis only
 };
 
 /// The state at one frame.
@@ -81,5 +83,12 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
                                                          const std::vector<Time>& frames,
                                                          const CameraMounting& mounting,
                                                          const navigation::NavigatorOptions& options = {});
+
+/// What `--poses from-imu-gnss` is called in options and runs.
+inline constexpr const char* poses_from_sensors = "from-imu-gnss";
+
+/// The same as a source of poses for io::Sequence. Errors: those of the function above; no GNSS data; a
+/// calibration without T_body_camera.
+io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options);
 
 }  // namespace pade

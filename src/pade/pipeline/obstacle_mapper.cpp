@@ -63,6 +63,22 @@ Status check(const Camera& camera, const ObstacleMapperOptions& options, const c
   return {};
 }
 
+/// The motion with its covariance. Over several frames the error is that of a velocity: it grows with their
+/// number.
+RelativeMotion motion_between(const Frame& reference, const Frame& other, int step) {
+  const bool newest_is_reference = reference.time > other.time;
+  const Frame& older = newest_is_reference ? other : reference;
+  const Frame& newer = newest_is_reference ? reference : other;
+  RelativeMotion motion = relative_motion(reference.T_world_camera, other.T_world_camera,
+                                          seconds_between(reference.time, other.time));
+  if (newer.motion_covariance.isZero(0)) return motion;
+  RelativeMotion forward =
+      relative_motion(older.T_world_camera, newer.T_world_camera, seconds_between(older.time, newer.time));
+  forward.covariance = step * step * newer.motion_covariance;
+  motion.covariance = newest_is_reference ? reversed(forward).covariance : forward.covariance;
+  return motion;
+}
+
 }  // namespace
 
 Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const ObstacleMapperOptions& options,
@@ -103,7 +119,8 @@ std::string ObstacleMapper::reason_to_skip(const cv::Mat& image, Time time, cons
   return {};
 }
 
-const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const Pose& T_world_camera) {
+const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const Pose& T_world_camera,
+                                        const Matrix6d& motion_covariance) {
   ++health_.frames;
   update_.seconds = {};
   const Stopwatch total(update_, Stage::total);
@@ -114,7 +131,7 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     return update_;
   }
 
-  Frame newest{time, {}, T_world_camera};
+  Frame newest{time, {}, T_world_camera, motion_covariance};
   {
     const Stopwatch watch(update_, Stage::grey);
     newest.image = to_grey(image);
@@ -134,8 +151,7 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
 /// Figures 1 and 2 of the paper, for one pair of frames.
 void ObstacleMapper::map_pair(const Frame& reference, const Frame& other) {
   // Compute relative translation and rotation (Section 2.2).
-  update_.motion = relative_motion(reference.T_world_camera, other.T_world_camera,
-                                   seconds_between(reference.time, other.time));
+  update_.motion = motion_between(reference, other, options_.step);
 
   // Remove the rotation, so that flow is parallax alone.
   cv::Mat seen = other.image;

@@ -94,7 +94,9 @@ class ObstacleMapper {
   /// the flight goes on.
   /// @param image  CV_8UC1 or CV_8UC3 (BGR), undistorted; copied. @param T_world_camera  pose at `time`.
   /// @return what was done; valid until the next call.
-  const MapperUpdate& add(const cv::Mat& image, Time time, const Pose& T_world_camera);
+  /// @param motion_covariance  of the motion from the frame before (Frame::motion_covariance); zero = exact.
+  const MapperUpdate& add(const cv::Mat& image, Time time, const Pose& T_world_camera,
+                          const Matrix6d& motion_covariance = Matrix6d::Zero());
 
   [[nodiscard]] const ObstacleMapperOptions& options() const { return options_; }
   [[nodiscard]] const Camera& camera() const { return camera_; }

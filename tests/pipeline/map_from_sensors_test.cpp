@@ -1,0 +1,200 @@
+// From raw sensors to depth: a simulated flight is mapped with the poses that the navigation filter makes of
+// its imu.csv and gnss.csv.
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "pade/pipeline/map_sequence.hpp"
+#include "pade/pipeline/navigation_run.hpp"
+#include "pade/simulation/simulated_sequence.hpp"
+
+namespace pade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+/// Keeps the head of a table and the rows with a stamp up to `last`.
+void cut_after(const fs::path& file, double last) {
+  std::istringstream rows(text_of(file));
+  std::ofstream out(file);
+  for (std::string row; std::getline(rows, row);) {
+    const bool is_number = !row.empty() && std::isdigit(static_cast<unsigned char>(row[0])) != 0;
+    if (!is_number || std::stod(row) <= last + 1e-9) out << row << '\n';
+  }
+}
+
+/// One flight for all tests: along a wall with things in front of it, 12 s.
+class MapFromSensors : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    root_ = fs::temp_directory_path() / ("pade_map_from_sensors_" + std::to_string(getpid()));
+    fs::create_directories(root_);
+    simulation::World world;
+    const auto add = [&](const simulation::Shape& shape, const Eigen::Vector3d& at,
+                         simulation::PatternKind kind) {
+      simulation::Visual visual{"v", {Eigen::Quaterniond::Identity(), at}, shape, {}, true};
+      visual.material.colour.setOnes();
+      visual.material.pattern.kind = kind;
+      world.visuals.push_back(std::move(visual));
+    };
+    add(simulation::Rectangle{{0, 0, 1}, {120, 120}}, {0, 0, 0}, simulation::PatternKind::gravel);
+    add(simulation::Box{{1, 60, 14}}, {30, 0, 6}, simulation::PatternKind::brick);
+    add(simulation::Box{{2, 2, 4}}, {24, 3.5, 2}, simulation::PatternKind::concrete);
+    add(simulation::Cylinder{0.4, 5}, {22, -3, 2.5}, simulation::PatternKind::bark);
+    world.sun = simulation::Sun{};
+    auto scene = simulation::Scene::build(std::move(world));
+    ASSERT_TRUE(scene);
+    simulation::Flight flight;
+    flight.name = "sensors";
+    for (int i = 0; i < 6; ++i) {
+      flight.waypoints.push_back({{-4.0 + 4 * i, 0.8 * (i % 2), 1.8 + 0.2 * (i % 3)}, 0.06 * (i % 2), {}});
+    }
+    flight.frames = 70;
+    Camera camera;
+    camera.width = 160;
+    camera.height = 120;
+    camera.fx = camera.fy = 138.6;
+    camera.cx = 79.5;
+    camera.cy = 59.5;
+    flight.camera = camera;
+    const Status written = simulation::write_sequence(*scene, flight, flown(), {});
+    ASSERT_TRUE(written) << written.error().message;
+  }
+  static void TearDownTestSuite() { fs::remove_all(root_); }
+
+  static fs::path flown() { return root_ / "flight"; }
+  /// A copy of the flight, for tests that change it.
+  static fs::path copy(const std::string& name) {
+    fs::copy(flown(), root_ / name, fs::copy_options::recursive);
+    return root_ / name;
+  }
+  static MapSequenceOptions options(const std::string& poses) {
+    MapSequenceOptions options;
+    options.sequence.poses = poses;
+    options.report = false;
+    return options;
+  }
+  static Result<io::Sequence> open(const fs::path& folder) {
+    return open_sequence(folder, options(poses_from_sensors));
+  }
+
+  static inline fs::path root_;
+};
+
+TEST_F(MapFromSensors, GivesDepthNearlyAsGoodAsTheTruePosesDo) {
+  double error[2];
+  int index = 0;
+  for (const char* poses : {"groundtruth", poses_from_sensors}) {
+    const auto sequence = open_sequence(flown(), options(poses));
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    EXPECT_GT(sequence->size(), 35U);
+    io::RunWriterOptions output;
+    output.image_size = sequence->camera().size();
+    auto writer = io::RunWriter::create(root_ / poses, output);
+    ASSERT_TRUE(writer);
+    const auto result = map_sequence(*sequence, options(poses), *writer, 1);
+    ASSERT_TRUE(result) << result.error().message;
+    ASSERT_TRUE(result->accuracy);
+    EXPECT_EQ(result->info.poses, poses == std::string("groundtruth") ? "groundtruth.txt" : poses);
+    error[index++] = result->accuracy->all.relative_mean;
+  }
+  EXPECT_GT(error[1], error[0]) << "the baseline has an error";
+  // In the first seconds after a start in motion yaw is known to some degrees: the baseline errs by a tenth.
+  EXPECT_LT(error[1], error[0] + 0.15);
+}
+
+TEST_F(MapFromSensors, FramesCarryTheCovarianceOfTheirMotionAndItIsHonest) {
+  const auto estimated = open(flown());
+  ASSERT_TRUE(estimated) << estimated.error().message;
+  const auto exact = open_sequence(flown(), options("groundtruth"));
+  ASSERT_TRUE(exact);
+  std::map<Time, Pose> truth;
+  for (std::size_t i = 0; i < exact->size(); ++i) truth[exact->time(i)] = exact->pose(i);
+  double nees = 0;
+  double rotation_nees = 0;
+  const std::size_t pairs = estimated->size() - 1;
+  for (std::size_t i = 1; i <= pairs; ++i) {
+    const auto frame = estimated->frame(i);
+    ASSERT_TRUE(frame);
+    const RelativeMotion motion = relative_motion(estimated->pose(i - 1), estimated->pose(i), 0.1);
+    const RelativeMotion right =
+        relative_motion(truth.at(estimated->time(i - 1)), truth.at(estimated->time(i)), 0.1);
+    const Eigen::Vector3d dt = motion.t_reference_other - right.t_reference_other;
+    const Eigen::Vector3d turn =
+        rotation_log(Eigen::Matrix3d(motion.R_reference_other * right.R_reference_other.transpose()));
+    EXPECT_LT(dt.norm(), 0.04);
+    nees += dt.dot(frame->motion_covariance.topLeftCorner<3, 3>().ldlt().solve(dt));
+    rotation_nees += turn.dot(frame->motion_covariance.bottomRightCorner<3, 3>().ldlt().solve(turn));
+  }
+  nees /= static_cast<double>(pairs);
+  rotation_nees /= static_cast<double>(pairs);
+  std::printf("frame to frame on the simulated flight: NEES of translation %.2f, of rotation %.2f (3)\n",
+              nees, rotation_nees);
+  EXPECT_GT(nees, 0.3);
+  EXPECT_LT(nees, 8);  // errors of neighbours are one error: a single short flight scatters widely
+  EXPECT_LT(rotation_nees, 6);
+}
+
+TEST_F(MapFromSensors, UsesNothingThatTheSensorsShowAfterAFrame) {
+  const auto whole = open(flown());
+  ASSERT_TRUE(whole) << whole.error().message;
+  const fs::path shorter = copy("shorter");
+  const Time last = whole->time(whole->size() - 10);
+  for (const char* file : {"imu.csv", "gnss.csv", "baro.csv", "mag.csv"})
+    cut_after(shorter / file, last.seconds());
+  const auto part = open(shorter);
+  ASSERT_TRUE(part) << part.error().message;
+  ASSERT_EQ(part->size(), whole->size() - 9);
+  for (std::size_t i = 0; i < part->size(); ++i) {
+    ASSERT_EQ(part->pose(i).translation, whole->pose(i).translation) << i;
+    ASSERT_EQ(part->pose(i).rotation.coeffs(), whole->pose(i).rotation.coeffs()) << i;
+  }
+}
+
+TEST_F(MapFromSensors, NamesWhatIsMissing) {
+  const auto refusal = [](const fs::path& folder) {
+    const auto sequence = open(folder);
+    return sequence ? std::string("accepted") : sequence.error().message;
+  };
+  const fs::path broken = copy("broken");
+  const std::string gnss = text_of(broken / "gnss.csv");
+  std::ofstream(broken / "gnss.csv") << gnss.substr(gnss.find('\n') + 1);
+  EXPECT_THAT(refusal(broken), HasSubstr("no frame given"));
+  fs::remove(broken / "gnss.csv");
+  EXPECT_THAT(refusal(broken),
+              HasSubstr("no GNSS positions and velocities found, expected them in gnss.csv"));
+  const std::string imu = text_of(broken / "imu.csv");
+  std::ofstream(broken / "gnss.csv") << gnss;
+  std::ofstream(broken / "imu.csv") << imu.substr(imu.find('\n') + 1);
+  EXPECT_THAT(refusal(broken), HasSubstr("no frame given"));
+  fs::remove(broken / "imu.csv");
+  EXPECT_THAT(refusal(broken), HasSubstr("no IMU log found"));
+  std::ofstream(broken / "imu.csv") << imu;
+  std::istringstream calibration(text_of(broken / "camera.yaml"));
+  std::ostringstream without;
+  for (std::string row; std::getline(calibration, row);) {
+    if (row.find("T_body_camera") == std::string::npos) without << row << '\n';
+  }
+  std::ofstream(broken / "camera.yaml") << without.str();
+  EXPECT_THAT(refusal(broken), HasSubstr("T_body_camera"));
+  const fs::path silent = copy("silent");
+  cut_after(silent / "gnss.csv", 0.3);
+  cut_after(silent / "mag.csv", -1);
+  EXPECT_THAT(refusal(silent),
+              testing::AnyOf(HasSubstr("never knew its yaw"), HasSubstr("no rows"), HasSubstr("no row")));
+}
+
+}  // namespace
+}  // namespace pade
