@@ -13,8 +13,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-extern char** environ;
-
 namespace pade::evaluation {
 namespace {
 
@@ -28,7 +26,7 @@ using TemporaryFile = std::unique_ptr<std::FILE, CloseFile>;
 std::string content_of(std::FILE* file) {
   std::string content;
   std::rewind(file);
-  std::array<char, 65536> part;
+  std::array<char, 65536> part{};
   for (std::size_t got = 0; (got = std::fread(part.data(), 1, part.size(), file)) > 0;)
     content.append(part.data(), got);
   return content;
