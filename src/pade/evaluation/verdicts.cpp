@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/evaluation/paper_values.hpp"
 #include "pade/evaluation/verdict_errors.hpp"
 #include "pade/evaluation/verdict_evidence.hpp"
 
@@ -14,9 +15,6 @@ namespace {
 
 constexpr double kSame = 0.10;    // relative: the largest difference that the paper calls comparable
 constexpr double kSlight = 0.10;  // metres: the least rise that the paper calls sensitive
-constexpr double kLeastRise = 0.10, kLargestRise = 0.30,
-                 kLargestFarRise = 0.65;  // metres, of TTC in Section 3.2
-constexpr double kMoreRobust = 0.30;      // Section 3.2
 
 // The mean of a figure of single ranges over ranges [from, to), those without a figure left out.
 template <class Figure>
@@ -230,7 +228,9 @@ class AccuracyJudge {
   Verdict ttc_rises() const {
     const auto evidence = per_range(
         0, 3, [&](const auto& s, Pixels p, std::size_t r) { return rise(s, lk_, Method::ttc, p, r); },
-        [](const Interval& i) { return i.above(0) && i.high >= kLeastRise && i.low <= kLargestRise; });
+        [](const Interval& i) {
+          return i.above(0) && i.high >= paper_figure3.ttc_rise_least && i.low <= paper_figure3.ttc_rise_most;
+        });
     return judge(
         "Noise raises TTC's error by 10 to 30 cm up to 12 m", "3.2",
         fmt::format("Rise of TTC's ADE under {} noise, Lucas-Kanade [m]; in favour = above 0 and not "
@@ -241,7 +241,9 @@ class AccuracyJudge {
   Verdict ttc_rises_far() const {
     const auto evidence = per_range(
         3, 4, [&](const auto& s, Pixels p, std::size_t r) { return rise(s, lk_, Method::ttc, p, r); },
-        [](const Interval& i) { return i.above(0) && i.high >= kLargestRise && i.low <= kLargestFarRise; });
+        [](const Interval& i) {
+          return i.above(0) && i.high >= paper_figure3.ttc_rise_most && i.low <= paper_figure3.ttc_rise_far;
+        });
     return judge("Noise raises TTC's error by up to 65 cm at 12-16 m", "3.2",
                  fmt::format("Rise of TTC's ADE under {} noise, Lucas-Kanade [m]; in favour = above 0 and "
                              "reaching into 0.30-0.65 m",
@@ -256,8 +258,8 @@ class AccuracyJudge {
     };
     std::vector<Evidence> evidence = per_set(saved, above_zero);
     for (const Evidence& e : std::vector<Evidence>(evidence)) {
-      evidence.push_back(
-          {e.label + ", by 30 % or more", e.interval, e.interval.above(0) && e.interval.high >= kMoreRobust});
+      evidence.push_back({e.label + ", by 30 % or more", e.interval,
+                          e.interval.above(0) && e.interval.high >= paper_figure3.pade_more_robust});
     }
     return judge("Under noise PADE is about 30 % more robust up to 12 m", "3.2",
                  fmt::format("Share by which PADE's ADE under {} noise is below TTC's, Lucas-Kanade, 0-12 m",
