@@ -32,10 +32,10 @@ p { max-width: 100ch; }
 .facts { display: grid; grid-template-columns: max-content 1fr; gap: 2px 16px; margin: 10px 0; }
 .facts dt { color: var(--soft); }
 .facts dd { margin: 0; overflow-wrap: anywhere; }
-td.words, th.words { text-align: left; white-space: normal; min-width: 7em; }
+td.words, th.words { text-align: left; white-space: normal; min-width: 9em; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); gap: 18px; margin: 12px 0; }
 .plots figure { break-inside: avoid; }
-svg.plot { width: 100%; max-width: 860px; height: auto; display: block; }
+svg.plot { width: 100%; max-width: 680px; height: auto; display: block; }
 svg.plot text { font: inherit; fill: inherit; }
 svg.plot g { font-family: system-ui, -apple-system, "Segoe UI", Roboto, Arial, sans-serif; }
 .verdict { display: grid; grid-template-columns: 124px 1fr; gap: 2px 16px; padding: 8px 0; border-bottom: 1px solid var(--line);
