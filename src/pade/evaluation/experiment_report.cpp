@@ -67,16 +67,6 @@ std::string command_block(const std::string& command) {
   return command.empty() ? "" : fmt::format("<div class=\"command\">{}</div>\n", escape_html(command));
 }
 
-// Columns of figures go to the right; a column of words has no cell that begins like a number.
-bool is_words(const ReportTable& table, std::size_t column) {
-  return std::none_of(table.rows.begin(), table.rows.end(), [column](const auto& row) {
-    if (column >= row.size()) return false;
-    const std::string& cell = row[column];
-    const std::size_t first = cell.find_first_not_of("+-");
-    return first != std::string::npos && std::isdigit(static_cast<unsigned char>(cell[first])) != 0;
-  });
-}
-
 std::string table_html(const ReportTable& table) {
   std::string html;
   if (!table.title.empty()) html += fmt::format("<h3>{}</h3>\n", escape_html(table.title));

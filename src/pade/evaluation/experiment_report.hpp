@@ -9,24 +9,18 @@
 
 #include <opencv2/core.hpp>
 
+#include "pade/evaluation/result_table.hpp"
 #include "pade/evaluation/verdicts.hpp"
 
 namespace pade::evaluation {
 
-/// A table as people read it.
-struct ReportTable {
-  std::string name;     ///< "table1"; not shown
-  std::string title;    ///< one line; may be empty
-  std::string command;  ///< that makes this table alone; may be empty where the section has it
-  std::string note;     ///< how to read it; may be empty
-  std::vector<std::string> columns;
-  std::vector<std::vector<std::string>> rows;  ///< text already, as many cells as there are columns
-};
+/// Its name is not shown; title, command (where the section has it) and note may be empty.
+using ReportTable = ResultTable;
 
 /// A plot or an image. One of `svg` and `image` is given.
 struct ReportPicture {
   std::string caption;
-  std::string svg = {};     ///< an <svg> element, as line_plot() gives it; not escaped
+  std::string svg = {};     ///< an <svg> element, as line_plot() gives it, or other HTML; not escaped
   cv::Mat image = {};       ///< CV_8UC1 or CV_8UC3 (BGR)
   bool photograph = false;  ///< the image is kept as JPEG, else as PNG
 };
