@@ -51,19 +51,10 @@ void set(T& field, const std::optional<T>& given) {
   if (given) field = *given;
 }
 
-/// The paper as it is printed: "literal PADE" of docs/method.md.
-void as_printed(ObstacleMapperOptions& mapper) {
-  mapper.depth.model = depth::Model::instantaneous;
-  mapper.depth.reading = depth::Reading::samelson;
-  mapper.derotation = depth::Derotation::flow;
-  mapper.order = Order::first;
-  mapper.depth.window = 4;
-}
-
 /// Defaults, then --paper, then the file of --config, then the single options.
 Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   MapSequenceOptions options;
-  if (arguments.paper) as_printed(options.mapper);
+  if (arguments.paper) options.mapper = as_printed(options.mapper);
   if (!arguments.config.empty()) {
     const auto text = io::read_file(arguments.config);
     if (!text) return text.error();

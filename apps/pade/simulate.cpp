@@ -1,6 +1,5 @@
 // `pade simulate`: flights through simulated worlds, written as sequences with exact truth.
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -11,11 +10,13 @@
 
 #include "pade/core/result.hpp"
 
+#include "cache.hpp"
 #include "commands.hpp"
 
 #ifdef PADE_HAS_SIMULATION
 #include "pade/io/atomic_output.hpp"
 #include "pade/simulation/paper_set.hpp"
+#include "pade/simulation/paper_set_files.hpp"
 #include "pade/simulation/sdf_reader.hpp"
 #include "pade/simulation/simulated_sequence.hpp"
 #include "pade/simulation/world_generator.hpp"
@@ -90,34 +91,26 @@ Flight default_flight(WorldKind kind) {
   return {};
 }
 
-fs::path default_cache() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
-    return fs::path(cache) / "pade";
-  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
-    return fs::path(home) / ".cache" / "pade";
-  return fs::path("pade-cache");
-}
-
 Status simulate_set(const SimulateArguments& arguments) {
   if (arguments.set != "paper") return Error{fmt::format("--set: found '{}', expected paper", arguments.set)};
   const fs::path folder =
       arguments.out.empty()
           ? default_cache() / fmt::format("paper-{}{}", arguments.seed, arguments.quick ? "-quick" : "")
           : fs::path(arguments.out);
-  SequenceOptions options = sequence_options(arguments);
-  options.keep_finished = true;
-  const auto sequences = paper_sequences(arguments.seed, arguments.quick);
-  for (std::size_t i = 0; i < sequences.size(); ++i) {
-    const PaperSequence& sequence = sequences[i];
-    const fs::path file = folder / "worlds" / sequence.name / (std::string(to_name(sequence.world)) + ".sdf");
-    if (const Status s = write_world(generate_world(sequence.world, sequence.world_seed), file); !s) return s;
-    const auto scene = load_scene(file, arguments);
-    if (!scene) return scene.error();
-    const std::string label = fmt::format("{} ({} of {})", sequence.name, i + 1, sequences.size());
-    if (const Status s = render(*scene, sequence.flight, folder / sequence.name, arguments, options, label);
-        !s)
-      return s;
-  }
+  std::optional<Progress> line;
+  std::string shown;
+  int known = 0;
+  const auto progress = [&](const std::string& label, int done, int total) {
+    if (label != shown) {
+      line.emplace("Rendering " + label, static_cast<std::size_t>(total));
+      shown = label;
+      known = 0;
+    }
+    for (; known < done; ++known) line->step();
+  };
+  const auto written =
+      write_paper_set(folder, arguments.seed, arguments.quick, sequence_options(arguments), progress);
+  if (!written) return written.error();
   fmt::print("{}\n", folder.string());
   return {};
 }

@@ -82,10 +82,12 @@ KernelParameters kernel_parameters(const DepthInput& input, const DepthOptions& 
   k.epipole2 = static_cast<float>(std::pow(std::min(needed(options.far), cone), 2));
   k.range = static_cast<float>(options.range);
   k.axis_variance = static_cast<float>(axis_variance);
-  k.left = static_cast<float>(-camera.cx);
-  k.right = static_cast<float>(camera.width - 1 - camera.cx);
-  k.top = static_cast<float>(-camera.cy);
-  k.bottom = static_cast<float>(camera.height - 1 - camera.cy);
+  // A match outside the other image is guessed by the flow method from its surroundings: doubtful.
+  const float beyond = gates ? 0 : std::numeric_limits<float>::infinity();
+  k.left = static_cast<float>(-camera.cx) - beyond;
+  k.right = static_cast<float>(camera.width - 1 - camera.cx) + beyond;
+  k.top = static_cast<float>(-camera.cy) - beyond;
+  k.bottom = static_cast<float>(camera.height - 1 - camera.cy) + beyond;
   int index = 0;
   for (int r = 0; r < 6; ++r) {
     for (int c = r; c < 6; ++c) k.pose[index++] = static_cast<float>(input.motion.covariance(r, c));

@@ -32,8 +32,8 @@ enum class Derotation {
 /// Which pixels with a positive depth are published.
 enum class Gates {
   on,   ///< those that the image and the geometry support; the rest gets its state
-  off,  ///< all of them but at the epipole: dense, for comparison with methods that do not know what they do
-        ///< not know
+  off,  ///< all of them but at the epipole, also where the match is not in view: dense, for comparison with
+        ///< methods that do not know what they do not know
 };
 
 /// Options of DepthEstimator.

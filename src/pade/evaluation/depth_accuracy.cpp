@@ -9,13 +9,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kOutlier = 0.25;  // relative error
 
-bool is_truth(float depth) { return depth > 0 && std::isfinite(depth); }
-
-std::size_t range_of(float true_depth) {
-  const auto* const limit = std::upper_bound(range_limits.begin(), range_limits.end(), true_depth);
-  return static_cast<std::size_t>(limit - range_limits.begin());
-}
-
 double share(double part, std::uint64_t whole) {
   return whole > 0 ? part / static_cast<double>(whole) : kNaN;
 }
@@ -52,6 +45,13 @@ RangeAccuracy average_range(std::span<const DepthAccuracy> sequences, Select sel
 }
 
 }  // namespace
+
+bool is_truth(float depth) { return depth > 0 && std::isfinite(depth); }
+
+std::size_t range_of(float true_depth) {
+  const auto* const limit = std::upper_bound(range_limits.begin(), range_limits.end(), true_depth);
+  return static_cast<std::size_t>(limit - range_limits.begin());
+}
 
 void Accumulator::Sums::add(float depth, float variance, float true_depth) {
   ++pixels;
@@ -108,18 +108,18 @@ RangeAccuracy Accumulator::Sums::result(double from, double to) const {
   return accuracy;
 }
 
-Accumulator::Accumulator(double max_depth) : max_depth_(max_depth) {}
+Accumulator::Accumulator(double max_depth, int grid) : max_depth_(max_depth), grid_(grid) {}
 
 void Accumulator::add(const DepthImage& estimate, const cv::Mat& truth) {
   if (truth.empty() || estimate.empty()) return;
   ++frames_;
   const float limit = max_depth_ > 0 ? static_cast<float>(max_depth_) : std::numeric_limits<float>::max();
   const int n = estimate.window;
-  for (int y = 0; y < truth.rows; ++y) {
+  for (int y = grid_ / 2; y < truth.rows; y += grid_) {
     const auto* true_row = truth.ptr<float>(y);
     const auto* depth_row = estimate.depth.ptr<float>(y / n);
     const float* variance_row = estimate.variance.empty() ? nullptr : estimate.variance.ptr<float>(y / n);
-    for (int x = 0; x < truth.cols; ++x) {
+    for (int x = grid_ / 2; x < truth.cols; x += grid_) {
       if (!is_truth(true_row[x])) continue;
       Sums& sums = ranges_[range_of(true_row[x])];
       ++sums.truth;

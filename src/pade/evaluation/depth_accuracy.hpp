@@ -19,6 +19,11 @@ namespace pade::evaluation {
 inline constexpr std::array<double, 4> range_limits = {4, 8, 12, 16};
 inline constexpr std::size_t range_count = range_limits.size() + 1;
 
+/// Whether a true depth is one: positive and finite.
+bool is_truth(float depth);
+/// Index of the range that a true depth lies in.
+std::size_t range_of(float true_depth);
+
 /// Accuracy over the pixels whose true depth lies in [from, to) metres. NaN where there is nothing to
 /// average.
 struct RangeAccuracy {
@@ -54,8 +59,10 @@ struct DepthAccuracy {
 /// Gathers the accuracy of a run frame by frame in fixed memory.
 class Accumulator {
  public:
-  /// `max_depth` in metres: estimates beyond it count as no depth and lower the coverage. 0 = no limit.
-  explicit Accumulator(double max_depth = 0);
+  /// @param max_depth  metres: estimates beyond it count as no depth and lower the coverage. 0 = no limit.
+  /// @param grid       only the pixels (grid / 2 + i grid, grid / 2 + j grid) are looked at: a sample for
+  /// many runs.
+  explicit Accumulator(double max_depth = 0, int grid = 1);
 
   /// Compares one depth image with the true depth of the same frame.
   /// @param estimate  any window; a window's depth stands for its n x n pixels.
@@ -79,6 +86,7 @@ class Accumulator {
   };
 
   double max_depth_;
+  int grid_;
   int frames_ = 0;
   std::array<Sums, range_count> ranges_;
 };

@@ -11,6 +11,7 @@
 #include "pade/evaluation/report_map.hpp"
 #include "pade/evaluation/report_pictures.hpp"
 #include "pade/evaluation/report_style.hpp"
+#include "pade/evaluation/report_text.hpp"
 #include "pade/io/flow_picture.hpp"
 
 namespace pade::evaluation {
@@ -19,37 +20,6 @@ namespace {
 constexpr int kPictureWidth = 640;      // pixels in the page's pictures
 constexpr double kLargestError = 0.25;  // relative, the ends of the error palette
 constexpr std::size_t kSkippedShown = 20;
-
-std::string escape(std::string_view text) {
-  std::string safe;
-  for (const char c : text) {
-    if (c == '&')
-      safe += "&amp;";
-    else if (c == '<')
-      safe += "&lt;";
-    else if (c == '>')
-      safe += "&gt;";
-    else if (c == '"')
-      safe += "&quot;";
-    else
-      safe += c;
-  }
-  return safe;
-}
-
-std::string percent(double share) { return std::isnan(share) ? "–" : fmt::format("{:.1f} %", 100 * share); }
-std::string number(double value, int decimals) {
-  return std::isnan(value) ? "–" : fmt::format("{:.{}f}", value, decimals);
-}
-
-// 1234567 as "1 234 567", with thin spaces that do not break.
-std::string grouped(std::uint64_t value) {
-  std::string digits = std::to_string(value);
-  for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3) {
-    digits.insert(static_cast<std::size_t>(at), "\u202f");
-  }
-  return digits;
-}
 
 std::string tile(std::string_view value, std::string_view meaning) {
   return fmt::format("<div class=\"tile\"><b>{}</b><span>{}</span></div>\n", value, meaning);
@@ -64,22 +34,22 @@ std::string header(const Report& report) {
   const io::RunInfo& info = report.info;
   std::string html =
       fmt::format("<h1>{}</h1>\n<p class=\"soft\">Obstacle map from one camera and a GPS/INS · pade {} · ",
-                  escape(sequence_name(info)), escape(info.version));
+                  escape_html(sequence_name(info)), escape_html(info.version));
   html +=
       fmt::format("camera {} × {} px, f = {:.1f} px", info.camera.width, info.camera.height, info.camera.fx);
-  if (!info.poses.empty()) html += fmt::format(" · poses from {}", escape(info.poses));
+  if (!info.poses.empty()) html += fmt::format(" · poses from {}", escape_html(info.poses));
   html += "</p>\n<div class=\"tiles\">\n";
   html += tile(fmt::format("{} / {}", info.health.frames_used, info.health.frames), "frames used");
   if (report.accuracy && report.accuracy->all.pixels > 0) {
-    html += tile(percent(report.accuracy->all.relative_median), "median relative depth error");
-    html += tile(percent(report.accuracy->all.coverage), "of the pixels with truth have depth");
+    html += tile(percent_text(report.accuracy->all.relative_median), "median relative depth error");
+    html += tile(percent_text(report.accuracy->all.coverage), "of the pixels with truth have depth");
   }
   if (info.map) {
-    html +=
-        tile(grouped(info.map->occupied_voxels), fmt::format("occupied voxels of {:g} m", info.map->voxel));
+    html += tile(grouped_text(info.map->occupied_voxels),
+                 fmt::format("occupied voxels of {:g} m", info.map->voxel));
   }
   if (report.timing.frames_per_second > 0)
-    html += tile(number(report.timing.frames_per_second, 1), "frames per second");
+    html += tile(number_text(report.timing.frames_per_second, 1), "frames per second");
   const auto total = std::find_if(report.timing.stages.begin(), report.timing.stages.end(),
                                   [](const io::StageTiming& stage) { return stage.stage == "total"; });
   if (total != report.timing.stages.end())
@@ -122,7 +92,7 @@ std::string state_items(const std::array<std::uint64_t, 6>* pixels) {
   for (std::size_t i = 0; i < state_colours.size(); ++i) {
     html += fmt::format("<span class=\"item\"><span class=\"swatch\" style=\"background:{}\"></span>{}",
                         state_colours[i], depth_state_names[i]);
-    if (total > 0) html += fmt::format(" <b>{}</b>", percent(static_cast<double>((*pixels)[i]) / total));
+    if (total > 0) html += fmt::format(" <b>{}</b>", percent_text(static_cast<double>((*pixels)[i]) / total));
     html += "</span>";
   }
   return html + "</div>";
@@ -165,8 +135,8 @@ std::string frame_block(const ReportFrame& frame, const Scales& scales) {
   const auto coloured = [](const cv::Mat& values, double from, double to, Palette palette) {
     return png_uri(colourise(values, from, to, palette), kPictureWidth, false);
   };
-  std::string html =
-      fmt::format("<div class=\"frame-block\"><h3>{}</h3>\n<div class=\"pictures\">\n", escape(frame.name));
+  std::string html = fmt::format("<div class=\"frame-block\"><h3>{}</h3>\n<div class=\"pictures\">\n",
+                                 escape_html(frame.name));
   html += figure("image", jpeg_uri(frame.image, kPictureWidth));
   if (!frame.flow.empty()) {
     cv::Mat flow = io::flow_colors(frame.flow, scales.flow);
@@ -195,16 +165,18 @@ std::string frames_section(const Report& report) {
 }
 
 std::string accuracy_row(const RangeAccuracy& range, bool with_sigma, bool is_all) {
-  std::string html = fmt::format("<tr{}><td>{}</td><td>{}</td><td>{}</td>", is_all ? " class=\"all\"" : "",
-                                 range_name(range), grouped(range.truth_pixels), percent(range.coverage));
+  std::string html =
+      fmt::format("<tr{}><td>{}</td><td>{}</td><td>{}</td>", is_all ? " class=\"all\"" : "",
+                  range_name(range), grouped_text(range.truth_pixels), percent_text(range.coverage));
   const std::string spread =
-      range.pixels == 0 ? "–" : fmt::format("{} ± {}", number(range.mean, 3), number(range.deviation, 3));
-  html +=
-      fmt::format("<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>", spread, number(range.median, 3),
-                  percent(range.relative_mean), percent(range.relative_median), percent(range.outliers));
+      range.pixels == 0 ? "–"
+                        : fmt::format("{} ± {}", number_text(range.mean, 3), number_text(range.deviation, 3));
+  html += fmt::format("<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>", spread,
+                      number_text(range.median, 3), percent_text(range.relative_mean),
+                      percent_text(range.relative_median), percent_text(range.outliers));
   if (with_sigma) {
-    html += fmt::format("<td>{}</td><td>{}</td><td>{}</td>", percent(range.within_1_sigma),
-                        percent(range.within_2_sigma), number(range.rms_of_sigma, 2));
+    html += fmt::format("<td>{}</td><td>{}</td><td>{}</td>", percent_text(range.within_1_sigma),
+                        percent_text(range.within_2_sigma), number_text(range.rms_of_sigma, 2));
   }
   return html + "</tr>\n";
 }
@@ -252,7 +224,7 @@ std::string map_section(const Report& report) {
       views.side, views.height_bar);
   html += "<p class=\"soft\">Camera path in orange, from the circle to the diamond.";
   if (views.cut_off > 0)
-    html += fmt::format(" {} scattered voxels lie outside the picture.", grouped(views.cut_off));
+    html += fmt::format(" {} scattered voxels lie outside the picture.", grouped_text(views.cut_off));
   html += "</p></figure>\n</div>\n";
   if (const auto& origin = report.info.origin) {
     html += fmt::format(
@@ -277,7 +249,7 @@ std::string timing_section(const io::RunTiming& timing) {
   for (const io::StageTiming& stage : timing.stages) {
     const auto x = [&](double ms) { return kLeft + kBar * std::min(ms, longest) / longest; };
     html += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", kLeft - 10, y + 14,
-                        escape(stage.stage));
+                        escape_html(stage.stage));
     html += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"14\" fill=\"{}\"/>", kLeft,
                         y + 3, std::max(1.0, x(stage.p50) - kLeft),
                         stage.stage == "total" ? "#5b6875" : "#0072b2");
@@ -301,14 +273,14 @@ std::string health_section(const io::RunInfo& info) {
   const std::size_t skipped = health.skipped.size();
   html += fmt::format("<div class=\"{}\">{} of {} frames used, {} depth images; {} skipped.</div>\n",
                       skipped > 0 ? "warning" : "good", health.frames_used, health.frames,
-                      health.depth_images, skipped == 0 ? "nothing" : grouped(skipped));
+                      health.depth_images, skipped == 0 ? "nothing" : grouped_text(skipped));
   for (const std::string& warning : health.warnings)
-    html += fmt::format("<div class=\"warning\">{}</div>\n", escape(warning));
+    html += fmt::format("<div class=\"warning\">{}</div>\n", escape_html(warning));
   if (skipped > 0) {
     html += "<table class=\"text\"><tr><th>skipped</th><th style=\"text-align:left\">why</th></tr>\n";
     for (std::size_t i = 0; i < std::min(skipped, kSkippedShown); ++i) {
-      html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escape(health.skipped[i].file),
-                          escape(health.skipped[i].reason));
+      html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escape_html(health.skipped[i].file),
+                          escape_html(health.skipped[i].reason));
     }
     html += "</table>\n";
     if (skipped > kSkippedShown)
@@ -335,8 +307,8 @@ void add_option_rows(const nlohmann::ordered_json& json, const std::string& pref
       add_option_rows(value, prefix + name + ".", html);
     } else {
       const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
-      html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escape(prefix + name),
-                          text.empty() ? "–" : escape(text));
+      html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escape_html(prefix + name),
+                          text.empty() ? "–" : escape_html(text));
     }
   }
 }
@@ -344,7 +316,7 @@ void add_option_rows(const nlohmann::ordered_json& json, const std::string& pref
 std::string options_section(const io::RunInfo& info) {
   std::string html = "<h2>How it was made</h2>\n<table class=\"text\">\n";
   html += fmt::format("<tr><td>sequence</td><td>{}</td></tr>\n<tr><td>program</td><td>pade {}</td></tr>\n",
-                      escape(info.sequence.string()), escape(info.version));
+                      escape_html(info.sequence.string()), escape_html(info.version));
   const auto options = nlohmann::ordered_json::parse(info.options, nullptr, false);
   if (options.is_object()) add_option_rows(options, "", html);
   return html + "</table>\n";
@@ -357,7 +329,7 @@ std::string to_html(const Report& report) {
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
       "content=\"width=device-width, initial-scale=1\">\n<title>{} – "
       "PADE</title>\n<style>{}</style>\n</head>\n<body>\n",
-      escape(sequence_name(report.info)), report_style);
+      escape_html(sequence_name(report.info)), report_style);
   html += header(report);
   html += accuracy_section(report);
   html += map_section(report);

@@ -60,15 +60,16 @@ const Table& table_of(Palette palette) {
   return tables[static_cast<std::size_t>(palette)];
 }
 
+constexpr std::string_view kBase64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
 std::string base64(const std::vector<unsigned char>& bytes) {
-  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   text.reserve((bytes.size() + 2) / 3 * 4);
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
     std::uint32_t group = 0;
     for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0U);
-    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? digits[group >> (18 - 6 * k) & 63U] : '=';
+    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kBase64[group >> (18 - 6 * k) & 63U] : '=';
   }
   return text;
 }
@@ -157,6 +158,25 @@ std::string png_uri(const cv::Mat& picture, int largest_width, bool smooth) {
 
 std::string jpeg_uri(const cv::Mat& picture, int largest_width) {
   return data_uri(picture, largest_width, cv::INTER_AREA, "jpg", {cv::IMWRITE_JPEG_QUALITY, 88});
+}
+
+std::string bytes_of_uri(std::string_view uri) {
+  constexpr std::string_view kMark = ";base64,";
+  const auto start = uri.find(kMark);
+  if (start == std::string_view::npos) return {};
+  std::string bytes;
+  unsigned value = 0;
+  int bits = 0;
+  for (const char c : uri.substr(start + kMark.size())) {
+    const auto digit = kBase64.find(c);
+    if (digit == std::string_view::npos) break;  // padding
+    value = (value << 6U | static_cast<unsigned>(digit)) & 0xffffffU;
+    bits += 6;
+    if (bits < 8) continue;
+    bits -= 8;
+    bytes += static_cast<char>(value >> static_cast<unsigned>(bits) & 0xffU);
+  }
+  return bytes;
 }
 
 double round_up_125(double value) {

@@ -81,6 +81,15 @@ RelativeMotion motion_between(const Frame& reference, const Frame& other, int st
 
 }  // namespace
 
+ObstacleMapperOptions as_printed(ObstacleMapperOptions options) {
+  options.depth.model = depth::Model::instantaneous;
+  options.depth.reading = depth::Reading::samelson;
+  options.derotation = depth::Derotation::flow;
+  options.order = Order::first;
+  options.depth.window = 4;
+  return options;
+}
+
 Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const ObstacleMapperOptions& options,
                                               const cv::Mat& valid) {
   if (const Status status = check(camera, options, valid); !status) return status.error();

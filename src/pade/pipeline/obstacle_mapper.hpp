@@ -50,6 +50,10 @@ struct ObstacleMapperOptions {
   }
 };
 
+/// The paper as it is printed ("literal PADE" of docs/method.md): instantaneous motion, Samelson inverse,
+/// flow derotated by B omega, depth on the first frame, 4 x 4 windows.
+ObstacleMapperOptions as_printed(ObstacleMapperOptions options = {});
+
 /// The stages of one frame, in order. `total` is the latency from add() to its return.
 enum class Stage { grey, derotate, flow, depth, map, total };
 inline constexpr std::array<std::string_view, 6> stage_names = {"grey",  "derotate", "flow",

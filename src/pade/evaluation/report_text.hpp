@@ -1,0 +1,20 @@
+// Text and numbers as the pages of reports show them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace pade::evaluation {
+
+/// `text` as text of HTML or SVG, or as the value of an attribute in double quotes.
+std::string escape_html(std::string_view text);
+
+/// A share as percent with one decimal; a dash for NaN.
+std::string percent_text(double share);
+/// With that many decimals; a dash for NaN.
+std::string number_text(double value, int decimals);
+/// 1234567 as "1 234 567", with thin spaces that do not break.
+std::string grouped_text(std::uint64_t value);
+
+}  // namespace pade::evaluation

@@ -1,0 +1,23 @@
+// Figure 4 of the paper: what the pipeline makes of a flight toward a building, at several moments.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pade/core/result.hpp"
+#include "pade/io/sequence.hpp"
+#include "pade/pipeline/experiment_plan.hpp"
+
+namespace pade::experiment {
+
+/// The job of figure 4 where it is asked for: the sequence "approach", else the first.
+std::optional<Job> flight_job(const PlanOptions& options, const std::vector<std::string>& sequences);
+
+/// Maps the whole sequence and gives JSON with a picture of image, flow, depth and map at each moment, as
+/// data: URIs and SVG, and with their scales.
+Result<std::string> run_flight(const Job& job, const io::Sequence& sequence,
+                               const std::function<bool()>& go_on);
+
+}  // namespace pade::experiment
