@@ -137,10 +137,10 @@ build() {
   echo "  built in $((SECONDS - start)) s"
 }
 
-# run_tests FOLDER [CTEST ARGUMENT...]
+# run_tests PRESET FOLDER [CTEST ARGUMENT...]: what build made.
 run_tests() {
-  local folder=$1
-  shift
+  local preset=$1 folder=$2
+  shift 2
   say "Testing $folder/ ..."
-  ctest --test-dir "$root/$folder" -j "$(job_count)" --output-on-failure --no-tests=error "$@"
+  (cd "$root" && ctest --preset "$preset" -j "$(job_count)" --no-tests=error "$@")
 }
