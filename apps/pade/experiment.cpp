@@ -75,6 +75,8 @@ Result<std::vector<fs::path>> simulated_set([[maybe_unused]] const ExperimentArg
   simulation::SequenceOptions options;
   options.seed = static_cast<std::uint64_t>(arguments.plan.seed);
   options.threads = arguments.jobs;
+  // What another version left in the cache is made anew; a folder that the user named is left alone.
+  if (arguments.set.empty()) options.overwrite = io::Overwrite::replace;
   std::optional<Progress> line;
   std::string shown;
   int known = 0;

@@ -158,7 +158,8 @@ Result<std::string> line_plot(const LinePlot& plot) {
   }
   if (Status status = check(plot, x, y); !status) return status.error();
   std::string script = head(plot.frame, y);
-  if (plot.log_x) script += "set logscale x\n";
+  if (plot.log_x)  // by itself gnuplot would go on to the next decade
+    script += fmt::format("set logscale x\nset xrange [{}:{}]\n", x.least / 1.1, x.most * 1.1);
   if (!plot.x_ticks.empty()) script += ticks(plot.x_ticks);
   std::vector<std::string> bands, lines;
   for (std::size_t i = 0; i < plot.series.size(); ++i) {

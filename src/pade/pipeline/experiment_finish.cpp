@@ -149,6 +149,7 @@ std::vector<Section> sections_of(const Results& results, const std::vector<Verdi
   if (results.has("table1")) {
     sections.push_back(section(results, table1(results), {table1_plots}));
     sections.push_back(section(results, answers_by_sequence(results)));
+    sections.push_back(section(results, flow_errors_table(results)));
   }
   if (results.has("figure3"))
     sections.push_back(section(results, figure3_table(results), {figure3_by_range, figure3_by_level}));

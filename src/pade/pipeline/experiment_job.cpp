@@ -4,12 +4,12 @@
 #include <deque>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
 
 #include "pade/core/fingerprint.hpp"
+#include "pade/core/random.hpp"
 #include "pade/depth/derotation.hpp"
 #include "pade/evaluation/cramer_rao.hpp"
 #include "pade/io/atomic_output.hpp"
@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kTogetherGrid = 4;  // two methods are compared on one pixel per window of the paper's 4 x 4
 
-const float kMeanOfNormal = static_cast<float>(std::sqrt(2 / std::numbers::pi));  // of its absolute value
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 /// The standard deviations of the noise of a level.
 evaluation::PoseNoise pose_noise(const RelativeMotion& motion, const evaluation::MotionNoise& noise) {
@@ -60,12 +60,13 @@ class Pass {
     for (const DepthCell& cell : job.cells) {
       estimators_.emplace_back(cell.depth);
       accuracies_.emplace_back(job.range, job.grid);
-      rivals_.push_back(rival_of(cell));
+      rivals_.push_back(index_of(cell.rival));
       results_.push_back({cell.name, {}, {}, {}});
       results_.back().draws.resize(static_cast<std::size_t>(job.draws));
       if (rivals_.back()) results_.back().together.resize(static_cast<std::size_t>(job.draws));
     }
     depths_.resize(job.cells.size());
+    flow_cell_ = index_of(job.flow_error_of);
   }
 
   /// Flow of one pair, and everything that follows from it.
@@ -94,7 +95,8 @@ class Pass {
       }
       compare(static_cast<std::size_t>(draw), *truth);
     }
-    if (job_.bound_sigma > 0) add_bound(motion, *truth);
+    if (job_.bound_sigma > 0) add_bound(motion, *truth, reference.frame.time);
+    if (flow_cell_) add_flow_error(motion, *truth);
   }
 
   JobResult result() {
@@ -102,13 +104,14 @@ class Pass {
     for (std::size_t i = 0; i < results_.size(); ++i) results_[i].accuracy = accuracies_[i].result();
     result.cells = std::move(results_);
     if (job_.bound_sigma > 0) result.bound = bound_;
+    if (flow_cell_) result.flow_error = flow_error_;
     return result;
   }
 
  private:
-  [[nodiscard]] std::optional<std::size_t> rival_of(const DepthCell& cell) const {
+  [[nodiscard]] std::optional<std::size_t> index_of(std::string_view name) const {
     for (std::size_t i = 0; i < job_.cells.size(); ++i) {
-      if (job_.cells[i].name == cell.rival) return i;
+      if (job_.cells[i].name == name) return i;
     }
     return std::nullopt;
   }
@@ -123,23 +126,47 @@ class Pass {
     }
   }
 
-  /// The mean |error| of a normal error with the bound's sigma is sigma sqrt(2 / pi); where sigma exceeds the
-  /// depth itself there is nothing to estimate.
-  void add_bound(const RelativeMotion& motion, const cv::Mat& truth) {
-    DepthImage best{{},
-                    1,
-                    evaluation::depth_bound(sequence_.camera(), motion, truth, job_.bound_sigma,
-                                            pose_noise(motion, job_.noise)),
-                    {},
-                    {}};
-    for (int y = 0; y < truth.rows; ++y) {
-      for (int x = 0; x < truth.cols; ++x) {
-        float& value = best.depth.at<float>(y, x);
-        const float Z = truth.at<float>(y, x);
-        value = value < Z ? Z + kMeanOfNormal * value : std::numeric_limits<float>::quiet_NaN();
+  /// An unbiased estimate that reaches the bound, counted like every other: what falls behind the camera or
+  /// beyond the range is none.
+  void add_bound(const RelativeMotion& motion, const cv::Mat& truth, Time time) {
+    const cv::Mat sigma = evaluation::depth_bound(sequence_.camera(), motion, truth, job_.bound_sigma,
+                                                  pose_noise(motion, job_.noise));
+    Random random(noise_seed(job_, job_.draws, time));
+    cv::Mat best(truth.size(), CV_32FC1, cv::Scalar(kNone));
+    for (int y = kTogetherGrid / 2; y < truth.rows; y += kTogetherGrid) {
+      for (int x = kTogetherGrid / 2; x < truth.cols; x += kTogetherGrid) {
+        best.at<float>(y, x) =
+            truth.at<float>(y, x) + sigma.at<float>(y, x) * static_cast<float>(random.normal());
       }
     }
-    bound_.add(best, truth, std::numeric_limits<double>::infinity(), kTogetherGrid);
+    bound_.add({{}, 1, best, {}, {}}, truth, job_.range, kTogetherGrid);
+  }
+
+  /// What the flow behind the exact depth of a cell was wrong by: depth, truth and motion tell it without the
+  /// flow.
+  void add_flow_error(const RelativeMotion& motion, const cv::Mat& truth) {
+    const cv::Mat metres_per_px = evaluation::depth_bound(sequence_.camera(), motion, truth, 1.0);
+    const float t_z = static_cast<float>(motion.t_reference_other.z());
+    cv::Mat parallax(truth.size(), CV_32FC1, cv::Scalar(kNone)), error = parallax.clone(),
+                                                                 leverage = parallax.clone();
+    for (int y = 0; y < truth.rows; ++y) {
+      for (int x = 0; x < truth.cols; ++x) {
+        const float Z = truth.at<float>(y, x), L = metres_per_px.at<float>(y, x);
+        const float estimate = depths_[*flow_cell_].depth.at<float>(y, x);
+        if (!(L < std::numeric_limits<float>::infinity()) || !(estimate > 0 && estimate <= job_.range) ||
+            !(estimate > t_z))
+          continue;
+        const float expected = (Z - t_z) / L;
+        const float found = expected * (Z - t_z) / (estimate - t_z);
+        parallax.at<float>(y, x) = Z + expected;
+        error.at<float>(y, x) = Z + std::abs(found - expected);
+        leverage.at<float>(y, x) = Z + L;
+      }
+    }
+    const double none = std::numeric_limits<double>::infinity();
+    flow_error_.parallax.add({{}, 1, parallax, {}, {}}, truth, none, job_.grid);
+    flow_error_.error.add({{}, 1, error, {}, {}}, truth, none, job_.grid);
+    flow_error_.metres_per_px.add({{}, 1, leverage, {}, {}}, truth, none, job_.grid);
   }
 
   const Job& job_;
@@ -152,6 +179,8 @@ class Pass {
   std::vector<CellResult> results_;
   std::vector<DepthImage> depths_;
   evaluation::RangeMeans bound_;
+  std::optional<std::size_t> flow_cell_;
+  FlowError flow_error_;
 };
 
 }  // namespace

@@ -39,9 +39,10 @@ struct Job {
   double range = 20;  ///< estimates beyond count as no depth, m
   int grid = 1;       ///< every grid-th pixel and row is compared with the truth
   evaluation::MotionNoise noise;
-  int draws = 1;           ///< of the noise
-  std::uint64_t seed = 1;  ///< of the noise
-  double bound_sigma = 0;  ///< px; above 0 the Cramer-Rao bound for this flow noise is computed as well
+  int draws = 1;              ///< of the noise
+  std::uint64_t seed = 1;     ///< of the noise
+  double bound_sigma = 0;     ///< px; above 0 the Cramer-Rao bound for this flow noise is computed as well
+  std::string flow_error_of;  ///< an exact cell without windows whose flow is judged as well; empty = none
   std::vector<DepthCell> cells;
 };
 
@@ -54,9 +55,18 @@ struct CellResult {
       together;  ///< the same where the rival has an answer; empty without one
 };
 
+/// The flow behind a depth where that depth has an answer: errors along the epipolar line, the only ones that
+/// reach depth. The "errors" of these means are the quantities themselves.
+struct FlowError {
+  evaluation::RangeMeans parallax;       ///< true length of the derotated flow, px
+  evaluation::RangeMeans error;          ///< |length found - true length|, px
+  evaluation::RangeMeans metres_per_px;  ///< the Cramer-Rao bound of depth for a flow error of 1 px, m
+};
+
 struct JobResult {
   std::vector<CellResult> cells;                ///< in the order of Job::cells
   std::optional<evaluation::RangeMeans> bound;  ///< mean |error| of the best unbiased estimate
+  std::optional<FlowError> flow_error;          ///< of Job::flow_error_of
 
   [[nodiscard]] const CellResult* cell(std::string_view name) const;
 };

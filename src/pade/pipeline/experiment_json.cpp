@@ -111,6 +111,7 @@ Json to_value(const Job& job) {
           {"draws", job.draws},
           {"seed", job.seed},
           {"bound_sigma_px", job.bound_sigma},
+          {"flow_error_of", job.flow_error_of},
           {"cells", std::move(cells)}};
 }
 
@@ -134,6 +135,11 @@ std::string to_json(const JobResult& result) {
   }
   Json json = {{"cells", std::move(cells)}};
   if (result.bound) json["bound"] = to_value(*result.bound);
+  if (const auto& flow = result.flow_error) {
+    json["flow_error"] = {{"parallax_px", to_value(flow->parallax)},
+                          {"error_px", to_value(flow->error)},
+                          {"m_per_px", to_value(flow->metres_per_px)}};
+  }
   return json.dump();
 }
 
@@ -146,6 +152,11 @@ Result<JobResult> job_result_from_json(std::string_view text, std::string_view f
                               list_from(cell.at("draws")), list_from(cell.at("together"))});
     }
     if (json.contains("bound")) result.bound = means_from(json.at("bound"));
+    if (json.contains("flow_error")) {
+      const Json& flow = json.at("flow_error");
+      result.flow_error = FlowError{means_from(flow.at("parallax_px")), means_from(flow.at("error_px")),
+                                    means_from(flow.at("m_per_px"))};
+    }
     return result;
   } catch (const Json::exception& error) {
     return Error{fmt::format("{}: found {}, expected the result of a job", file, error.what())};

@@ -43,6 +43,7 @@ void add_table1(const PlanOptions& options, const std::string& sequence, std::ve
     for (const auto& [method, rival] : {std::pair{pade_literal, ttc}, std::pair{pade_exact, ttc_exact}}) {
       Job job = job_for("table1", sequence, flow, method, options);
       job.cells = {cell(rival, method, options.range), cell(method, rival, options.range)};
+      if (method == pade_exact) job.flow_error_of = pade_exact;
       jobs.push_back(std::move(job));
     }
   }

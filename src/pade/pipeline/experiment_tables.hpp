@@ -16,6 +16,8 @@ std::string command_of(const PlanOptions& options, std::string_view table);
 
 /// Accuracy of every flow with every depth method, beside the paper's.
 evaluation::ResultTable table1(const Results& results);
+/// The flow's error along the epipolar line behind exact PADE, and the depth error that it has to cause.
+evaluation::ResultTable flow_errors_table(const Results& results);
 /// Which share of the pixels each method answers, by sequence: TTC has no answer without forward motion.
 evaluation::ResultTable answers_by_sequence(const Results& results);
 /// Accuracy against noise, with the Cramer-Rao bound.

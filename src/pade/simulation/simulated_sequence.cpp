@@ -337,7 +337,14 @@ Status write_sequence(const Scene& scene, const Flight& flight, const fs::path& 
 
   const std::string made_of = record(scene, flight, camera, options);
   if (options.keep_finished) {
-    if (const auto found = io::read_file(out / simulation_record); found && *found == made_of) return {};
+    const auto found = io::read_file(out / simulation_record);
+    if (found && *found == made_of) return {};
+    if (found && options.overwrite == io::Overwrite::refuse) {
+      return Error{fmt::format(
+          "{}: found a sequence of another world, flight, option or version of the program, expected the one "
+          "of this command or none (pade simulate --force replaces it)",
+          out.string())};
+    }
   }
   if (const Status s = check_target(out, options.overwrite); !s) return s;
   const fs::path work = partial_folder(out);
