@@ -68,7 +68,9 @@ Result<Scene> load_scene(const fs::path& file, const SimulateArguments& argument
   if (!world) return world.error();
   for (const std::string& warning : world->warnings)
     fmt::print(stderr, "pade simulate: warning: {}\n", warning);
-  return Scene::build(std::move(world).value());
+  auto scene = Scene::build(std::move(world).value());
+  if (!scene) return Error{fmt::format("{}: {}", file.string(), scene.error().message)};
+  return scene;
 }
 
 Status render(const Scene& scene, Flight flight, const fs::path& out, const SimulateArguments& arguments,

@@ -152,6 +152,21 @@ TEST_F(SdfReader, RefusesWhatIsMissing) {
               HasSubstr("broken.png"));
 }
 
+TEST_F(SdfReader, RefusalsSayWhere) {
+  for (const char* visual :
+       {"<geometry><mesh><uri>no.obj</uri></mesh></geometry>",
+        "<geometry><box><size>1 1 "
+        "1</size></box></geometry><material><pbr><metal><albedo_map>no.png</albedo_map>"
+        "</metal></pbr></material>",
+        "<geometry><cilinder><radius>1</radius></cilinder></geometry>",
+        "<geometry><sphere><radius>0,4</radius></sphere></geometry>",
+        "<geometry><box><size>1 1 "
+        "1</size></box></geometry><material><pade:pattern>marble</pade:pattern></material>"}) {
+    EXPECT_THAT(message(read_sdf(world(model(visual)))), testing::ContainsRegex("a\\.sdf:[1-9][0-9]*: "))
+        << visual;
+  }
+}
+
 TEST_F(SdfReader, RefusesAnIncludeOfItself) {
   write("models/a/model.sdf",
         "<sdf version='1.9'><model name='a'><include><uri>model://b</uri></include></model></sdf>");
@@ -171,6 +186,11 @@ TEST_F(SdfReader, RefusesBadNumbersAndPatterns) {
       message(read_sdf(world(
           model(std::string(kBox) + "<material><pade:pattern scale='big'>brick</pade:pattern></material>")))),
       HasSubstr("scale=\"big\""));
+  // libsdformat alone would read the 0 before the comma.
+  EXPECT_THAT(message(read_sdf(world(model("<geometry><sphere><radius>0,4</radius></sphere></geometry>")))),
+              HasSubstr("field <radius>: found '0,4'"));
+  EXPECT_THAT(message(read_sdf(world(model("<geometry><box><size>1 2,5 3</size></box></geometry>")))),
+              HasSubstr("2,5"));
   EXPECT_THAT(message(read_sdf(write("b.sdf", "<sdf version='1.9'><world"))), HasSubstr("b.sdf"));
 }
 

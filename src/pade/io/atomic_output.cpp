@@ -103,6 +103,9 @@ void watch_for_interrupts() {
 bool interrupted() { return interrupt_flag != 0; }
 
 Error interrupted_error() { return {"interrupted; nothing was written"}; }
+Error interrupted_and_kept_error() {
+  return {"interrupted; what was finished is kept, and the same command goes on from there"};
+}
 
 Result<OutputFolder> OutputFolder::create(const fs::path& target, Overwrite overwrite,
                                           std::string_view marker) {

@@ -26,6 +26,8 @@ void watch_for_interrupts();
 bool interrupted();
 /// The error that a loop returns when it leaves because of interrupted().
 Error interrupted_error();
+/// The same where finished parts stay and the next run goes on from them.
+Error interrupted_and_kept_error();
 
 /// A folder that appears at its place with commit(), or never. Until then everything lies in a hidden folder
 /// beside it; the destructor removes what was not committed.

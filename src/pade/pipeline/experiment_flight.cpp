@@ -123,7 +123,7 @@ Result<std::string> run_flight(const Job& job, const io::Sequence& sequence,
   std::vector<Eigen::Vector3d> path;
   double flown = 0;
   for (std::size_t i = 0; i < sequence.size(); ++i) {
-    if (go_on && !go_on()) return io::interrupted_error();
+    if (go_on && !go_on()) return io::interrupted_and_kept_error();
     const auto frame = sequence.frame(i);
     if (!frame) continue;
     if (!path.empty()) flown += (frame->T_world_camera.translation - path.back()).norm();

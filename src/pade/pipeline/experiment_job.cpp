@@ -192,7 +192,7 @@ Result<JobResult> run_job(const Job& job, const io::Sequence& sequence, const st
   std::deque<Loaded> recent;
   std::size_t undecodable = 0;
   for (std::size_t i = 0; i < sequence.size(); ++i) {
-    if (go_on && !go_on()) return io::interrupted_error();
+    if (go_on && !go_on()) return io::interrupted_and_kept_error();
     auto frame = sequence.frame(i);
     if (!frame) {
       if (Status status = sequence.check(++undecodable); !status) return status.error();

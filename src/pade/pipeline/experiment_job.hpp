@@ -80,7 +80,7 @@ Result<JobResult> job_result_from_json(std::string_view text, std::string_view f
 /// @param fingerprint  of the sequence's content.
 std::string job_name(const Job& job, std::string_view fingerprint);
 
-/// Does the job. `go_on` is asked after each frame; false leaves with io::interrupted_error().
+/// Does the job. `go_on` is asked after each frame; false leaves with io::interrupted_and_kept_error().
 Result<JobResult> run_job(const Job& job, const io::Sequence& sequence, const std::function<bool()>& go_on);
 
 }  // namespace pade::experiment

@@ -236,7 +236,7 @@ Status do_tasks(const std::vector<Task>& tasks, const Store& store, const Share&
   }
   next = 0;
   work(alone);
-  if (io::interrupted()) return io::interrupted_error();
+  if (io::interrupted()) return io::interrupted_and_kept_error();
   return failure ? Status(*failure) : Status();
 }
 

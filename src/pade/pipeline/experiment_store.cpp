@@ -122,7 +122,7 @@ Result<std::string> folder_fingerprint(const fs::path& folder) {
     std::ifstream stream(file, std::ios::binary);
     if (!stream) return Error{fmt::format("{}: cannot be read", file.string())};
     while (stream) {
-      if (io::interrupted()) return io::interrupted_error();
+      if (io::interrupted()) return io::interrupted_and_kept_error();
       stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
       fingerprint.bytes(buffer.data(), static_cast<std::size_t>(stream.gcount()));
     }

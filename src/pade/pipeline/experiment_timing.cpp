@@ -161,7 +161,7 @@ Result<JobTimes> measure_times(const Job& job, const io::Sequence& sequence,
   std::deque<Frame> recent;
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < sequence.size() && pairs <= kPairs; ++i) {
-    if (go_on && !go_on()) return io::interrupted_error();
+    if (go_on && !go_on()) return io::interrupted_and_kept_error();
     auto frame = sequence.frame(i);
     if (!frame) continue;
     if (frame->image.channels() == 3) cv::cvtColor(frame->image, frame->image, cv::COLOR_BGR2GRAY);

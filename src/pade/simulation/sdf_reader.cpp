@@ -103,6 +103,7 @@ Result<World> Reader::read() {
     }
   }
   if (const auto error = printed_error(printed)) return Error{fmt::format("{}: {}", file_.string(), *error)};
+  if (const Status s = check_numbers(root.Element(), file_.string()); !s) return s.error();
   world_.warnings = unsupported_elements(root.Element(), file_.string());
   if (root.WorldCount() > 0) {
     const sdf::World& world = *root.WorldByIndex(0);
@@ -177,8 +178,9 @@ Status Reader::add_link(const sdf::Link& link, const Pose& T_world_model, const 
 Status Reader::read_pattern(const sdf::ElementPtr& element, Material& material) const {
   if (!element || !element->HasElement("pade:pattern")) return {};
   const sdf::ElementPtr pattern = element->GetElement("pade:pattern");
+  // libsdformat knows no line of an element that is not its own.
   const std::string where =
-      fmt::format("{}:{}: <pade:pattern>", pattern->FilePath(), pattern->LineNumber().value_or(0));
+      place_of(pattern->LineNumber() ? pattern : element, file_.string()) + ": <pade:pattern>";
   const auto name = pattern->GetValue() ? pattern->Get<std::string>() : std::string();
   const auto kind = from_name<PatternKind>(name);
   if (!kind) {
@@ -214,8 +216,9 @@ Result<Material> Reader::material_of(const sdf::Material& source) const {
   if (!image.empty()) {
     const auto found = resolve_uri(image, folder_of(source.FilePath()), resources_);
     if (!found)
-      return Error{fmt::format("{}: found albedo_map '{}', which is in none of the resource folders",
-                               file_.string(), image)};
+      return Error{
+          fmt::format("{}: found albedo_map '{}', which is neither beside it nor in a resource folder",
+                      place_of(source.Element(), file_.string()), image)};
     auto pixels = read_texture_image(*found);
     if (!pixels) return pixels.error();
     material.image = std::move(pixels).value();
@@ -261,6 +264,12 @@ Status Reader::add_visual(const sdf::Visual& source, const Pose& T_world_link, c
       break;
     case sdf::GeometryType::MESH:
       return add_mesh(*geometry->MeshShape(), std::move(visual), has_material);
+    case sdf::GeometryType::EMPTY:
+      if (geometry->Element() && geometry->Element()->HasElement("empty")) return {};
+      return Error{
+          fmt::format("{}: visual '{}': found no shape that is known, expected box, sphere, cylinder, "
+                      "capsule, ellipsoid, plane or mesh",
+                      place_of(geometry->Element(), file_.string()), visual.name)};
     default:
       world_.warnings.push_back(
           fmt::format("visual '{}': its geometry is not supported and left out", visual.name));
@@ -273,8 +282,9 @@ Status Reader::add_visual(const sdf::Visual& source, const Pose& T_world_link, c
 Status Reader::add_mesh(const sdf::Mesh& mesh, Visual visual, bool has_material) {
   const auto file = resolve_uri(mesh.Uri(), folder_of(mesh.FilePath()), resources_);
   if (!file) {
-    return Error{fmt::format("visual '{}': found mesh '{}', which is in none of the resource folders",
-                             visual.name, mesh.Uri())};
+    return Error{
+        fmt::format("{}: visual '{}': found mesh '{}', which is neither beside it nor in a resource folder",
+                    place_of(mesh.Element(), file_.string()), visual.name, mesh.Uri())};
   }
   auto known = meshes_.find(file->string());
   if (known == meshes_.end()) {

@@ -1,11 +1,16 @@
 #include "pade/simulation/sdf_warnings.hpp"
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <regex>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 #include <fmt/format.h>
+
+#include "pade/io/text.hpp"
 
 namespace pade::simulation {
 namespace {
@@ -171,6 +176,33 @@ std::vector<std::string> unsupported_elements(const sdf::ElementPtr& root, const
             : fmt::format("{}: {} is not supported and left out, {} times", note.where, what, note.count));
   }
   return sentences;
+}
+
+std::string place_of(const sdf::ElementPtr& element, const std::string& file) {
+  if (!element) return file;
+  const std::string& own = element->FilePath();
+  const std::string where = own.empty() || own.front() == '<' ? file : own;
+  return element->LineNumber() ? fmt::format("{}:{}", where, *element->LineNumber()) : where;
+}
+
+Status check_numbers(const sdf::ElementPtr& root, const std::string& file) {
+  static const std::array<std::string_view, 9> numeric = {
+      "double", "float", "int", "unsigned int", "vector3", "vector2d", "vector2i", "pose", "color"};
+  if (!root) return {};
+  const sdf::ParamPtr value = root->GetValue();
+  if (value && std::find(numeric.begin(), numeric.end(), value->GetTypeName()) != numeric.end()) {
+    std::istringstream words(value->GetAsString());
+    for (std::string word; words >> word;) {
+      if (!io::parse_number(word)) {
+        return Error{fmt::format("{}: field <{}>: found '{}', expected a number (with a decimal point)",
+                                 place_of(root, file), root->GetName(), word)};
+      }
+    }
+  }
+  for (sdf::ElementPtr child = root->GetFirstElement(); child; child = child->GetNextElement()) {
+    if (const Status s = check_numbers(child, file); !s) return s;
+  }
+  return {};
 }
 
 std::optional<std::string> printed_error(const std::string& printed) {

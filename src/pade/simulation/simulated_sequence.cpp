@@ -207,7 +207,7 @@ class Recorder {
 Status Recorder::record(const FrameProgress& progress) const {
   const int total = static_cast<int>(stations_.size());
   for (int i = 0; i < total; ++i) {
-    if (io::interrupted()) return io::interrupted_error();
+    if (io::interrupted()) return io::interrupted_and_kept_error();
     // The image is written last: where it is, the frame is finished.
     const std::string name = image_name(stations_[static_cast<std::size_t>(i)].time);
     if (!io::path_exists(work_ / "rgb" / name)) {
