@@ -33,8 +33,10 @@ p { max-width: 100ch; }
 .facts dt { color: var(--soft); }
 .facts dd { margin: 0; overflow-wrap: anywhere; }
 td.words, th.words { text-align: left; white-space: normal; min-width: 9em; }
+td.words:nth-child(2) { min-width: 16em; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); gap: 18px; margin: 12px 0; }
 .plots figure { break-inside: avoid; }
+.plots figure:has(> div) { grid-column: 1 / -1; }
 svg.plot { width: 100%; max-width: 680px; height: auto; display: block; }
 svg.plot text { font: inherit; fill: inherit; }
 svg.plot g { font-family: system-ui, -apple-system, "Segoe UI", Roboto, Arial, sans-serif; }
