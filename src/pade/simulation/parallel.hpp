@@ -1,7 +1,8 @@
-// Rows of an image shared out between threads. Each row is computed alone, so the number of threads cannot
-// show.
+// Rows or tiles of an image shared out between threads. Each is computed alone, so the number of threads
+// cannot show.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 #include <vector>
@@ -20,7 +21,23 @@ void parallel_rows(int rows, int threads, const Work& work) {
   run();
 }
 
-/// Rows of tiles of `side` pixels that cover `pixels` rows.
-constexpr int tile_rows(int pixels, int side) { return (pixels + side - 1) / side; }
+/// Calls work(state, left, top) for every tile of `side` pixels that covers some of width x height, with one
+/// make_state() for a band of tiles. Tiles are taken by squares of four by four: what one of them found in
+/// memory its neighbours find in the cache.
+template <class MakeState, class Work>
+void parallel_tiles(int width, int height, int side, int threads, const MakeState& make_state,
+                    const Work& work) {
+  const int square = 4 * side;
+  parallel_rows((height + square - 1) / square, threads, [&](int band) {
+    auto state = make_state();
+    const int bottom = std::min((band + 1) * square, height);
+    for (int from = 0; from < width; from += square) {
+      const int right = std::min(from + square, width);
+      for (int top = band * square; top < bottom; top += side) {
+        for (int left = from; left < right; left += side) work(state, left, top);
+      }
+    }
+  });
+}
 
 }  // namespace pade::simulation

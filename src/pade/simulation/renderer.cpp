@@ -130,14 +130,14 @@ Eigen::Array3f Renderer::Implementation::shade(const Fragment& fragment, const E
         paint.scale * Eigen::Vector2f(frame.gradient_u.dot(across), frame.gradient_v.dot(across));
     const Eigen::Vector2f dv =
         paint.scale * Eigen::Vector2f(frame.gradient_u.dot(along), frame.gradient_v.dot(along));
-    const int most_taps = std::min(2 * samples, 8);  // no finer than the rays
+    const int most_taps = samples == 1 ? 1 : std::min(2 * samples, 8);  // no finer than the rays
     Eigen::Array3f texel = paint.texture->sample(at, du, dv, most_taps);
     if (paint.stained && samples > 1) {  // a preview does without
       // Turned and scaled by numbers that share no period with the tile.
       constexpr float kC = 0.83F;
       constexpr float kS = 0.56F;
       const Eigen::Vector2f turned(kC * at.x() - kS * at.y(), kS * at.x() + kC * at.y());
-      texel *= 0.72F + 0.56F * clouds.sample(turned, du, dv, samples == 1 ? 1 : most_taps);
+      texel *= 0.72F + 0.56F * clouds.sample(turned, du, dv, most_taps);
     }
     albedo *= (paint.mean + paint.contrast * (texel - paint.mean)).max(0.005F);
   }
@@ -326,33 +326,32 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
   const int samples = std::clamp(options.samples, 1, kMostSamples);
   const std::vector<Eigen::Vector2d> offsets = sample_pattern(samples);
   const bool shadows = options.shadows && self.scene.world().sun && self.scene.world().sun->casts_shadows;
-  parallel_rows(tile_rows(size.height, ray_packet_side), threads, [&](int tile) {
-    Block block(self.scene, grid, T_world_camera, offsets);
-    for (int left = 0; left < size.width; left += ray_packet_side) {
-      block.trace(left, tile * ray_packet_side);
-      block.find_fragments(options, self.to_sun);
-      if (shadows) block.trace_shadows(self.to_sun);
-      for (int lane = 0; lane < kLanes; ++lane) {
-        if (!block.seen(lane)) continue;
-        const int column = left + lane % ray_packet_side;
-        const int row = tile * ray_packet_side + lane / ray_packet_side;
-        const Block::Pixel& pixel = block.pixel(lane);
-        Eigen::Array3f light = Eigen::Array3f::Zero();
-        for (std::size_t f = 0; f < static_cast<std::size_t>(pixel.count); ++f) {
-          light +=
-              self.shade(pixel.fragments[f], block.right(lane), block.down(lane), pixel.where[f], samples);
+  const auto make_block = [&] { return Block(self.scene, grid, T_world_camera, offsets); };
+  parallel_tiles(
+      size.width, size.height, ray_packet_side, threads, make_block, [&](Block& block, int left, int top) {
+        block.trace(left, top);
+        block.find_fragments(options, self.to_sun);
+        if (shadows) block.trace_shadows(self.to_sun);
+        for (int lane = 0; lane < kLanes; ++lane) {
+          if (!block.seen(lane)) continue;
+          const int column = left + lane % ray_packet_side;
+          const int row = top + lane / ray_packet_side;
+          const Block::Pixel& pixel = block.pixel(lane);
+          Eigen::Array3f light = Eigen::Array3f::Zero();
+          for (std::size_t f = 0; f < static_cast<std::size_t>(pixel.count); ++f) {
+            light +=
+                self.shade(pixel.fragments[f], block.right(lane), block.down(lane), pixel.where[f], samples);
+          }
+          if (pixel.sky > 0) {
+            light += self.sky(block.centre(lane).direction) *
+                     (static_cast<float>(pixel.sky) / static_cast<float>(samples));
+          }
+          out.radiance.at<cv::Vec3f>(row, column) = {light[0], light[1], light[2]};
+          if (block.centre(lane).primitive.hit()) {
+            out.depth.at<float>(row, column) = static_cast<float>(block.centre(lane).depth);
+          }
         }
-        if (pixel.sky > 0) {
-          light += self.sky(block.centre(lane).direction) *
-                   (static_cast<float>(pixel.sky) / static_cast<float>(samples));
-        }
-        out.radiance.at<cv::Vec3f>(row, column) = {light[0], light[1], light[2]};
-        if (block.centre(lane).primitive.hit()) {
-          out.depth.at<float>(row, column) = static_cast<float>(block.centre(lane).depth);
-        }
-      }
-    }
-  });
+      });
   return out;
 }
 

@@ -123,6 +123,11 @@ RTCRay lane_of(const RayPacket& rays, std::size_t i, unsigned mask) {
           0};
 }
 
+/// A plane seen edge on has no good intersection; its triangle was hit all the same, `about` there.
+double plausible(double exact, double about) {
+  return std::abs(exact - about) < 1e-3 * about ? exact : about;
+}
+
 RTCIntersectContext coherent_context() {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -314,10 +319,35 @@ double Scene::exact_distance(Primitive primitive, const Eigen::Vector3d& origin,
     return hit ? hit->distance : about;
   }
   const Facet& facet = geometry.facets[geometry.facet_of_triangle[primitive.index()]];
-  const double slope = facet.normal.dot(direction);
-  const double exact = (facet.offset - facet.normal.dot(origin)) / slope;
-  // A plane seen edge on has no good intersection; the triangle was hit all the same.
-  return std::abs(exact - about) < 1e-3 * about ? exact : about;
+  return plausible((facet.offset - facet.normal.dot(origin)) / facet.normal.dot(direction), about);
+}
+
+VectorPacket::Lanes Scene::exact_distances(const HitPacket& hits, const Eigen::Vector3d& origin,
+                                           const VectorPacket& directions) const {
+  const Geometry& geometry = implementation_->geometry;
+  VectorPacket::Lanes distances;
+  const Facet* facet = nullptr;
+  double offset = 0;  // from the origin, along the normal
+  Primitive before;
+  for (std::size_t i = 0; i < ray_packet_size; ++i) {
+    const Primitive primitive = hits.primitive[i];
+    const Eigen::Vector3d direction(directions.x[i], directions.y[i], directions.z[i]);
+    const auto about = static_cast<double>(hits.distance[i]);
+    if (!primitive.hit()) {
+      distances[i] = std::numeric_limits<double>::quiet_NaN();
+    } else if (primitive.is_quadric()) {
+      distances[i] = exact_distance(primitive, origin, direction, about);
+    } else {
+      if (primitive != before) {  // neighbours mostly hit the same
+        facet = &geometry.facets[geometry.facet_of_triangle[primitive.index()]];
+        offset = facet->offset - facet->normal.dot(origin);
+        before = primitive;
+      }
+      const double exact = offset / facet->normal.dot(direction);
+      distances[i] = plausible(exact, about);
+    }
+  }
+  return distances;
 }
 
 std::uint32_t Scene::surface_id(Primitive primitive) const {

@@ -39,6 +39,12 @@ struct RayPacket {
   }
 };
 
+/// Sixteen vectors, axis by axis, in double precision.
+struct VectorPacket {
+  using Lanes = std::array<double, ray_packet_size>;
+  alignas(64) Lanes x, y, z;
+};
+
 /// What a ray hit: a facet's triangle, a quadric, or nothing.
 struct Primitive {
   static constexpr std::uint32_t none = 0xffffffff;
@@ -85,6 +91,9 @@ class Scene {
   /// The distance of a hit on `primitive` in double precision, from the float that the packet gave.
   [[nodiscard]] double exact_distance(Primitive primitive, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double about) const;
+  /// The same for a packet of rays from one point; NaN in lanes that hit nothing.
+  [[nodiscard]] VectorPacket::Lanes exact_distances(const HitPacket& hits, const Eigen::Vector3d& origin,
+                                                    const VectorPacket& directions) const;
   /// Which flat or curved surface it is: equal for the two triangles of a face. Pixels shade once per
   /// surface.
   [[nodiscard]] std::uint32_t surface_id(Primitive primitive) const;

@@ -104,25 +104,30 @@ Eigen::Array3f Texture::sample(const Eigen::Vector2f& at, const Eigen::Vector2f&
   const float length = std::min(longer.norm(), 1e6F);
   // The width of the parallelogram across its longer side.
   const float width = length > 0 ? std::abs(longer.x() * shorter.y() - longer.y() * shorter.x()) / length : 0;
-  const int taps = std::clamp(static_cast<int>(std::ceil(length / std::max(width, 1.0F))), 1, most_taps);
+  const int taps = std::clamp(-floor_of(-length / std::max(width, 1.0F)), 1, most_taps);
   const float footprint = std::max(length / static_cast<float>(taps), width);
   const float level =
       std::clamp(std::log2(std::max(footprint, 1.0F)), 0.0F, static_cast<float>(levels_.size() - 1));
-  const auto fine = static_cast<std::size_t>(level);
+  const auto fine = static_cast<std::size_t>(most_taps == 1 ? level + 0.5F : level);
   const std::size_t coarse = std::min(fine + 1, levels_.size() - 1);
-  const float blend = level - static_cast<float>(fine);
+  const float blend = most_taps == 1 ? 0 : level - static_cast<float>(fine);
+  // Sizes are powers of two: these quotients and the products with them are exact.
+  const auto shrunk = [this](std::size_t index) -> Eigen::Vector2f {
+    return {static_cast<float>(levels_[index].width) / static_cast<float>(levels_[0].width),
+            static_cast<float>(levels_[index].height) / static_cast<float>(levels_[0].height)};
+  };
+  const Eigen::Vector2f at_fine = shrunk(fine);
+  const Eigen::Vector2f at_coarse = shrunk(coarse);
+  const auto value = [&](std::size_t index, const Eigen::Vector2f& p) {
+    return bilinear(levels_[index], p.x(), p.y());
+  };
 
   Eigen::Array4f sum = Eigen::Array4f::Zero();
   for (int tap = 0; tap < taps; ++tap) {
     const float along = (static_cast<float>(tap) + 0.5F) / static_cast<float>(taps) - 0.5F;
     const Eigen::Vector2f p = position + along * longer;
-    const auto value = [&](std::size_t index) {
-      const Level& chosen = levels_[index];
-      return bilinear(chosen, p.x() * static_cast<float>(chosen.width) / static_cast<float>(levels_[0].width),
-                      p.y() * static_cast<float>(chosen.height) / static_cast<float>(levels_[0].height));
-    };
-    sum += (1 - blend) * value(fine);
-    if (blend > 0) sum += blend * value(coarse);
+    sum += (1 - blend) * value(fine, p.cwiseProduct(at_fine));
+    if (blend > 0) sum += blend * value(coarse, p.cwiseProduct(at_coarse));
   }
   return (sum / static_cast<float>(taps)).head<3>();
 }

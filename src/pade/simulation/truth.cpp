@@ -1,5 +1,6 @@
 #include "pade/simulation/truth.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -25,34 +26,57 @@ void over_tile(const RayGrid& grid, int left, int top, const Work& work) {
   }
 }
 
+/// The rays of a tile in the world; lanes outside the lens are left out, those outside the image repeat its
+/// rim.
+void tile_rays(const RayGrid& grid, const Eigen::Matrix3d& R, const Eigen::Vector3f& origin, int left,
+               int top, VectorPacket& directions, RayPacket& rays) {
+  const Camera& camera = grid.camera();
+  for (int lane = 0; lane < ray_packet_size; ++lane) {
+    const int column = std::min(left + lane % kSide, camera.width - 1);
+    const int row = std::min(top + lane / kSide, camera.height - 1);
+    const auto i = static_cast<std::size_t>(lane);
+    const Eigen::Vector2d& ray = grid.ray(column, row);
+    const Eigen::Vector3d direction = R * Eigen::Vector3d(ray.x(), ray.y(), 1);
+    directions.x[i] = direction.x();
+    directions.y[i] = direction.y();
+    directions.z[i] = direction.z();
+    rays.direction_x[i] = static_cast<float>(direction.x());
+    rays.direction_y[i] = static_cast<float>(direction.y());
+    rays.direction_z[i] = static_cast<float>(direction.z());
+    rays.active[i] = ray.x() == ray.x() ? -1 : 0;
+  }
+  rays.origin_x.fill(origin.x());
+  rays.origin_y.fill(origin.y());
+  rays.origin_z.fill(origin.z());
+  rays.nearest.fill(0);
+  rays.farthest.fill(kInfinity);
+}
+
 void depth_tile(const Scene& scene, const RayGrid& grid, const Eigen::Matrix3d& R,
                 const Eigen::Vector3d& origin, int left, int top, cv::Mat& depth) {
-  std::array<Eigen::Vector3d, ray_packet_size> directions;
-  RayPacket rays{};
-  over_tile(grid, left, top, [&](int lane, int column, int row) {
-    const Eigen::Vector2d& ray = grid.ray(column, row);
-    auto& direction = directions[static_cast<std::size_t>(lane)];
-    direction = R * Eigen::Vector3d(ray.x(), ray.y(), 1);
-    rays.set(lane, origin, direction, 0, kInfinity);
-  });
+  VectorPacket directions;
+  RayPacket rays;
+  tile_rays(grid, R, origin.cast<float>(), left, top, directions, rays);
   const HitPacket hits = scene.nearest(rays);
-  over_tile(grid, left, top, [&](int lane, int column, int row) {
-    const auto i = static_cast<std::size_t>(lane);
-    if (!hits.primitive[i].hit()) return;
-    depth.at<float>(row, column) = static_cast<float>(scene.exact_distance(
-        hits.primitive[i], origin, directions[i], static_cast<double>(hits.distance[i])));
-  });
+  const VectorPacket::Lanes distances = scene.exact_distances(hits, origin, directions);
+  const int columns = std::min(kSide, depth.cols - left);
+  for (int y = 0; y < std::min(kSide, depth.rows - top); ++y) {
+    auto* row = depth.ptr<float>(top + y) + left;
+    for (int x = 0; x < columns; ++x)
+      row[x] = static_cast<float>(distances[static_cast<std::size_t>(y * kSide + x)]);
+  }
 }
 
 }  // namespace
 
 cv::Mat exact_depth(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera, int threads) {
-  cv::Mat depth(grid.camera().size(), CV_32FC1, cv::Scalar(std::numeric_limits<double>::quiet_NaN()));
+  cv::Mat depth(grid.camera().size(), CV_32FC1);
   const Eigen::Matrix3d R = T_world_camera.matrix3();
-  parallel_rows(tile_rows(depth.rows, kSide), threads, [&](int tile) {
-    for (int left = 0; left < depth.cols; left += kSide)
-      depth_tile(scene, grid, R, T_world_camera.translation, left, tile * kSide, depth);
-  });
+  parallel_tiles(
+      depth.cols, depth.rows, kSide, threads, [] { return 0; },
+      [&](int, int left, int top) {
+        depth_tile(scene, grid, R, T_world_camera.translation, left, top, depth);
+      });
   return depth;
 }
 
@@ -67,33 +91,33 @@ ExactFlow exact_flow(const Scene& scene, const RayGrid& grid, const cv::Mat& dep
   const Pose T_second_first = T_world_second.inverse() * T_world_first;
   const Eigen::Matrix3d R = T_second_first.matrix3();
   const Eigen::Matrix3d R_world_second = T_world_second.matrix3();
-  parallel_rows(tile_rows(camera.height, kSide), threads, [&](int tile) {
-    for (int left = 0; left < camera.width; left += kSide) {
-      RayPacket rays{};
-      over_tile(grid, left, tile * kSide, [&](int lane, int column, int row) {
-        const Eigen::Vector2d& ray = grid.ray(column, row);
-        const auto z = static_cast<double>(depth.at<float>(row, column));
-        const bool sky = std::isnan(z);
-        Eigen::Vector3d point = R * Eigen::Vector3d(ray.x(), ray.y(), 1);
-        if (!sky) point = z * point + T_second_first.translation;
-        const auto pixel = camera.project(point);
-        if (!pixel) return;
-        out.flow.at<cv::Vec2f>(row, column) = {static_cast<float>(pixel->x() - column),
-                                               static_cast<float>(pixel->y() - row)};
-        const bool inside = pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= camera.width - 1 &&
-                            pixel->y() <= camera.height - 1;
-        if (inside) {
-          rays.set(lane, T_world_second.translation, R_world_second * point, 0,
-                   sky ? static_cast<float>(kFar) : kBeforeTheSurface);
-        }
+  parallel_tiles(
+      camera.width, camera.height, kSide, threads, [] { return 0; },
+      [&](int, int left, int top) {
+        RayPacket rays{};
+        over_tile(grid, left, top, [&](int lane, int column, int row) {
+          const Eigen::Vector2d& ray = grid.ray(column, row);
+          const auto z = static_cast<double>(depth.at<float>(row, column));
+          const bool sky = std::isnan(z);
+          Eigen::Vector3d point = R * Eigen::Vector3d(ray.x(), ray.y(), 1);
+          if (!sky) point = z * point + T_second_first.translation;
+          const auto pixel = camera.project(point);
+          if (!pixel) return;
+          out.flow.at<cv::Vec2f>(row, column) = {static_cast<float>(pixel->x() - column),
+                                                 static_cast<float>(pixel->y() - row)};
+          const bool inside = pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= camera.width - 1 &&
+                              pixel->y() <= camera.height - 1;
+          if (inside) {
+            rays.set(lane, T_world_second.translation, R_world_second * point, 0,
+                     sky ? static_cast<float>(kFar) : kBeforeTheSurface);
+          }
+        });
+        const auto hidden = scene.occluded(rays, Scene::Blockers::everything);
+        over_tile(grid, left, top, [&](int lane, int column, int row) {
+          const auto i = static_cast<std::size_t>(lane);
+          if (rays.active[i] != 0 && !hidden[i]) out.visible.at<std::uint8_t>(row, column) = 255;
+        });
       });
-      const auto hidden = scene.occluded(rays, Scene::Blockers::everything);
-      over_tile(grid, left, tile * kSide, [&](int lane, int column, int row) {
-        const auto i = static_cast<std::size_t>(lane);
-        if (rays.active[i] != 0 && !hidden[i]) out.visible.at<std::uint8_t>(row, column) = 255;
-      });
-    }
-  });
   return out;
 }
 
