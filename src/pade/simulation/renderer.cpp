@@ -76,7 +76,7 @@ struct Renderer::Implementation {
   explicit Implementation(const Scene& of);
   [[nodiscard]] Eigen::Array3f shade(const Fragment& fragment, const Eigen::Vector3d& right,
                                      const Eigen::Vector3d& down, const Lane& lane, int samples) const;
-  [[nodiscard]] Eigen::Array3f sky(const Eigen::Vector3d& direction) const;
+  [[nodiscard]] Eigen::Array3f sky(const Eigen::Vector3d& direction, int samples) const;
 };
 
 Renderer::Implementation::Implementation(const Scene& of) : scene(of) {
@@ -149,7 +149,7 @@ Eigen::Array3f Renderer::Implementation::shade(const Fragment& fragment, const E
   return albedo * (sun_light * sun + share * sky_light * ambient);
 }
 
-Eigen::Array3f Renderer::Implementation::sky(const Eigen::Vector3d& direction) const {
+Eigen::Array3f Renderer::Implementation::sky(const Eigen::Vector3d& direction, int samples) const {
   const World& world = scene.world();
   Eigen::Array3f colour = world.background.cast<float>().array();
   if (!world.sky) return colour;
@@ -157,7 +157,7 @@ Eigen::Array3f Renderer::Implementation::sky(const Eigen::Vector3d& direction) c
   const float height = std::max(d.z(), 0.0F);
   // Clouds on a flat layer, faded toward the horizon, where they would crowd.
   const Eigen::Vector2f at = Eigen::Vector2f(d.x(), d.y()) / (height + 0.15F) * 2.5F;
-  const float cloud = clouds.sample(at, {0.05F, 0}, {0, 0.05F}).x();
+  const float cloud = clouds.sample(at, {0.05F, 0}, {0, 0.05F}, samples == 1 ? 1 : 8).x();
   const float cover = std::clamp(2.2F * (cloud - 0.45F), 0.0F, 1.0F) * std::min(1.0F, 4 * height);
   colour += (0.85F - colour) * 0.7F * std::exp(-5 * height);
   return colour + (0.95F - colour) * 0.8F * cover;
@@ -343,7 +343,7 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
                 self.shade(pixel.fragments[f], block.right(lane), block.down(lane), pixel.where[f], samples);
           }
           if (pixel.sky > 0) {
-            light += self.sky(block.centre(lane).direction) *
+            light += self.sky(block.centre(lane).direction, samples) *
                      (static_cast<float>(pixel.sky) / static_cast<float>(samples));
           }
           out.radiance.at<cv::Vec3f>(row, column) = {light[0], light[1], light[2]};

@@ -101,6 +101,15 @@ Eigen::Array3f Texture::sample(const Eigen::Vector2f& at, const Eigen::Vector2f&
   Eigen::Vector2f longer = across.cwiseProduct(texels_per_unit_);
   Eigen::Vector2f shorter = down.cwiseProduct(texels_per_unit_);
   if (longer.squaredNorm() < shorter.squaredNorm()) std::swap(longer, shorter);
+  if (most_taps == 1) {  // the nearest level, log2(length) rounded, from the exponent of 2 length^2
+    const int twice = std::ilogb(std::clamp(2 * longer.squaredNorm(), 1.0F, 1e12F));
+    const auto index = std::min(static_cast<std::size_t>(twice / 2), levels_.size() - 1);
+    const Level& level = levels_[index];
+    return bilinear(level,
+                    position.x() * static_cast<float>(level.width) / static_cast<float>(levels_[0].width),
+                    position.y() * static_cast<float>(level.height) / static_cast<float>(levels_[0].height))
+        .head<3>();
+  }
   const float length = std::min(longer.norm(), 1e6F);
   // The width of the parallelogram across its longer side.
   const float width = length > 0 ? std::abs(longer.x() * shorter.y() - longer.y() * shorter.x()) / length : 0;
@@ -108,9 +117,9 @@ Eigen::Array3f Texture::sample(const Eigen::Vector2f& at, const Eigen::Vector2f&
   const float footprint = std::max(length / static_cast<float>(taps), width);
   const float level =
       std::clamp(std::log2(std::max(footprint, 1.0F)), 0.0F, static_cast<float>(levels_.size() - 1));
-  const auto fine = static_cast<std::size_t>(most_taps == 1 ? level + 0.5F : level);
+  const auto fine = static_cast<std::size_t>(level);
   const std::size_t coarse = std::min(fine + 1, levels_.size() - 1);
-  const float blend = most_taps == 1 ? 0 : level - static_cast<float>(fine);
+  const float blend = level - static_cast<float>(fine);
   // Sizes are powers of two: these quotients and the products with them are exact.
   const auto shrunk = [this](std::size_t index) -> Eigen::Vector2f {
     return {static_cast<float>(levels_[index].width) / static_cast<float>(levels_[0].width),
