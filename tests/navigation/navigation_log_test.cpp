@@ -168,6 +168,15 @@ TEST(GnssLog, RefusesAFileWithoutFrame) {
   EXPECT_THAT(read.error().message, HasSubstr("# frame=ENU origin=lat,lon,h"));
 }
 
+TEST(BarometerLog, LeavesOutARowWithoutAFiniteSigma) {
+  std::vector<std::string> remarks;
+  const auto read = parse_barometer("t_s,height_m,sigma_m\n0,1,0.1\n1,2,x\n", "baro.csv", remarks);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->size(), 1U);
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_THAT(remarks[0], HasSubstr("1 of 2 rows left out"));
+}
+
 TEST(TruthLog, LooksNorthLevelWhenTheQuaternionIsTheIdentityOfNed) {
   std::vector<std::string> remarks;
   const auto read =

@@ -349,11 +349,12 @@ Result<std::vector<BarometricHeight>> parse_barometer(std::string_view text, std
   for (std::size_t row = 0; row < table->rows(); ++row) {
     const auto time = parse_time(table->stamps[row]);
     const double value = table->at(row, *height);
-    if (!time || !std::isfinite(value)) {
+    const double deviation = sigma ? table->at(row, *sigma) : 0.3;
+    if (!time || !std::isfinite(value) || !std::isfinite(deviation)) {
       ++left_out;
       continue;
     }
-    samples.push_back({*time, value, sigma ? table->at(row, *sigma) : 0.3});
+    samples.push_back({*time, value, deviation});
   }
   remark_left_out(*table, left_out, remarks);
   return samples;
