@@ -145,12 +145,36 @@ TEST(GnssLog, PlacesGeodeticPositionsOnTheGround) {
   EXPECT_THAT(remarks[0], HasSubstr("no sigmas"));
 }
 
+TEST(GnssLog, LeavesOutWhatHasNoFiniteSigma) {
+  std::vector<std::string> remarks;
+  const auto read = parse_gnss(
+      "# frame=ENU\nt_s,pE,pN,pU,vE,vN,vU,sE,sN,sU,svE,svN,svU\n"
+      "0,1,2,3,4,5,6,1,1,nan,0.1,0.1,0.1\n1,1,2,3,4,5,6,1,1,1,0.1,1e200,0.1\n2,1,2,3,4,5,6,nan,1,1,1,nan,1\n",
+      "gnss.csv", {}, remarks);
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->fixes.size(), 1U);
+  EXPECT_EQ(read->fixes[0].time, Time::from_seconds(1));
+  ASSERT_EQ(read->velocities.size(), 1U);
+  EXPECT_EQ(read->velocities[0].time, Time::from_seconds(0));
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_THAT(remarks[0], HasSubstr("1 of 3 rows left out"));
+}
+
 TEST(GnssLog, RefusesAFileWithoutFrame) {
   std::vector<std::string> remarks;
   const auto read =
       parse_gnss("t_s,a,b,c,d,e,f,g,h,i,j,k,l\n0,1,2,3,4,5,6,7,8,9,10,11,12\n", "gnss.csv", {}, remarks);
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().message, HasSubstr("# frame=ENU origin=lat,lon,h"));
+}
+
+TEST(BarometerLog, LeavesOutARowWithoutAFiniteSigma) {
+  std::vector<std::string> remarks;
+  const auto read = parse_barometer("t_s,height_m,sigma_m\n0,1,0.1\n1,2,x\n", "baro.csv", remarks);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->size(), 1U);
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_THAT(remarks[0], HasSubstr("1 of 2 rows left out"));
 }
 
 TEST(TruthLog, LooksNorthLevelWhenTheQuaternionIsTheIdentityOfNed) {

@@ -52,17 +52,38 @@ class Protocol : public testing::Test {
 
 /// Of the pairs with an error under 10 % of the baseline, the share that a threshold on baseline over sigma
 /// keeps when it refuses 95 % of those with an error over 20 %: the best that any threshold does.
-double kept_at_95(const std::vector<evaluation::MotionError>& errors) {
+template <class Statistic>
+double kept_at_95(const std::vector<evaluation::MotionError>& errors, const Statistic& statistic) {
   std::vector<double> bad;
   std::vector<double> good;
   for (const auto& e : errors) {
-    const double statistic = e.estimated_baseline / e.sigma;
-    if (e.translation > 0.2 * e.baseline) bad.push_back(statistic);
-    if (e.translation < 0.1 * e.baseline) good.push_back(statistic);
+    if (e.translation > 0.2 * e.baseline) bad.push_back(statistic(e));
+    if (e.translation < 0.1 * e.baseline) good.push_back(statistic(e));
   }
   const double threshold = evaluation::quantile(bad, 0.95);
   const auto kept = std::count_if(good.begin(), good.end(), [&](double s) { return s > threshold; });
   return static_cast<double>(kept) / static_cast<double>(good.size());
+}
+
+double kept_at_95(const std::vector<evaluation::MotionError>& errors) {
+  return kept_at_95(errors, [](const auto& e) { return e.estimated_baseline / e.tail_sigma; });
+}
+
+/// The errors with the rms that the other draws have at the same time in place of the predicted sigma: of an
+/// oracle that knows how wrong the IMU is at each moment.
+std::vector<evaluation::MotionError> with_rms_of_others(
+    const std::vector<std::vector<evaluation::MotionError>>& draws) {
+  std::vector<evaluation::MotionError> result;
+  for (std::size_t i = 0; i < draws.front().size(); ++i) {
+    double sum = 0;
+    for (const auto& draw : draws) sum += draw[i].translation * draw[i].translation;
+    for (const auto& draw : draws) {
+      result.push_back(draw[i]);
+      const double others = sum - draw[i].translation * draw[i].translation;
+      result.back().tail_sigma = std::sqrt(others / static_cast<double>(draws.size() - 1));
+    }
+  }
+  return result;
 }
 
 TEST_F(Protocol, TwentySeeds) {
@@ -135,6 +156,7 @@ TEST_F(Protocol, ScaleValidOverTwentyDrawsOfTheGnssNoise) {
     const auto model =
         carrier ? simulation::GnssModel::carrier_phase() : simulation::GnssModel::single_point();
     std::vector<evaluation::MotionError> pooled;
+    std::vector<std::vector<evaluation::MotionError>> draws;
     std::vector<double> kept;
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
       NavigationProtocol protocol;
@@ -142,18 +164,26 @@ TEST_F(Protocol, ScaleValidOverTwentyDrawsOfTheGnssNoise) {
       const auto log = redrawn(recorded, model, 100 + seed);
       const auto f = run_protocol(log, mav_options(log), protocol);
       pooled.insert(pooled.end(), f.short_errors.begin(), f.short_errors.end());
+      draws.push_back(f.short_errors);
+      ASSERT_EQ(draws.back().size(), draws.front().size());
       kept.push_back(kept_at_95(f.short_errors));
     }
     const auto all = evaluation::summarise(pooled);
     std::printf(
         "%s, GNSS noise drawn anew 20 times, all pairs: 0.1 s 95 %% %.3f cm; scale_valid false where bad "
-        "%.3f, true "
-        "where good %.3f; a threshold made for 0.95 of one draw keeps %.3f (least) %.3f (median) %.3f "
+        "%.4f of %zu, true where good %.4f of %zu; a threshold made for 0.95 of one draw keeps %.3f (least) "
+        "%.3f (median) %.3f "
         "(most)\n",
-        carrier ? "RTK" : "SPP", 100 * all.translation_95, all.invalid_where_bad, all.valid_where_good,
-        evaluation::quantile(kept, 0), evaluation::quantile(kept, 0.5), worst(kept));
+        carrier ? "RTK" : "SPP", 100 * all.translation_95, all.invalid_where_bad, all.bad,
+        all.valid_where_good, all.good, evaluation::quantile(kept, 0), evaluation::quantile(kept, 0.5),
+        worst(kept));
+    std::printf(
+        "    at 95 %% of all bad pairs refused: kept %.4f; by an oracle of the true baseline %.4f, of the "
+        "IMU's errors %.4f\n",
+        kept_at_95(pooled), kept_at_95(pooled, [](const auto& e) { return e.baseline / e.tail_sigma; }),
+        kept_at_95(with_rms_of_others(draws)));
     EXPECT_GT(all.invalid_where_bad, 0.94);
-    EXPECT_GT(all.valid_where_good, 0.75);  // 0.80 is wanted: docs/navigation.md, "Limits"
+    EXPECT_GT(all.valid_where_good, 0.77);  // 0.80 is wanted: docs/navigation.md, "Limits"
   }
 }
 
@@ -277,15 +307,22 @@ TEST_F(Protocol, LateGnss) {
   }
 }
 
-/// Seconds after `from` until the error over 0.1 s stays below twice that of the run without glitches: twice
-/// its 95 %, or twice its error at that time where that is more.
+/// Seconds after `from` until the 95 % error of 1 s windows is back at or below twice that of the same window
+/// of the run without glitches (or of that whole run, where that is more).
 double recovery(const NavigationFigures& figures, const NavigationFigures& clean, double from) {
+  constexpr std::size_t kWindow = 10;  // pairs in 1 s
   double bad_until = from;
-  for (std::size_t i = 0; i < std::min(figures.short_errors.size(), clean.short_errors.size()); ++i) {
+  const auto window_95 = [](const std::vector<evaluation::MotionError>& errors, std::size_t first) {
+    std::vector<double> window;
+    for (std::size_t i = first; i < first + kWindow; ++i) window.push_back(errors[i].translation);
+    return evaluation::quantile(window, 0.95);
+  };
+  const std::size_t pairs = std::min(figures.short_errors.size(), clean.short_errors.size());
+  for (std::size_t i = 0; i + kWindow <= pairs; ++i) {
     const double t = figures.short_errors[i].t2.seconds();
-    if (t < from || t > from + 5) continue;
-    const double usual = std::max(clean.short_errors[i].translation, clean.short_pairs.translation_95);
-    if (figures.short_errors[i].translation > 2 * usual) bad_until = std::max(bad_until, t);
+    if (t < from || t > from + 8) continue;
+    const double usual = std::max(window_95(clean.short_errors, i), clean.short_pairs.translation_95);
+    if (window_95(figures.short_errors, i) > 2 * usual) bad_until = t;
   }
   return bad_until - from;
 }
@@ -317,6 +354,7 @@ TEST_F(Protocol, Glitches) {
         if (name == "outliers" && random.uniform() < 0.1) {
           log.gnss.fixes[i].position += 20 * random.normal3();
           log.gnss.velocities[i].velocity += 2 * random.normal3();
+          glitches.push_back(t);
         }
       }
       NavigationProtocol protocol;
@@ -331,11 +369,10 @@ TEST_F(Protocol, Glitches) {
       }
     }
     std::printf("%s: 0.1 s 95 %% at most %.2f x clean (20 seeds)", name.c_str(), worst(ratios));
-    if (!recoveries.empty()) {
-      std::printf("; after %zu glitches the error was below 2 x clean again within %.1f s at the latest",
-                  recoveries.size(), worst(recoveries));
-      EXPECT_LT(worst(recoveries), 3);
-    }
+    ASSERT_FALSE(recoveries.empty());
+    std::printf("; after %zu glitches the windows of 1 s were at most 2 x clean again within %.1f s",
+                recoveries.size(), worst(recoveries));
+    EXPECT_LT(worst(recoveries), 3);
     std::printf("\n");
     EXPECT_LT(worst(ratios), 2);
   }

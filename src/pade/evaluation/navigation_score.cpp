@@ -42,6 +42,7 @@ std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vec
   error.baseline = T.translation.norm();
   error.estimated_baseline = estimate.motion.t_reference_other.norm();
   error.sigma = std::sqrt(estimate.motion.covariance.topLeftCorner<3, 3>().trace());
+  error.tail_sigma = estimate.motion.covariance.topLeftCorner<3, 3>().norm() / error.sigma;
   error.nees = difference.dot(estimate.motion.covariance.topLeftCorner<3, 3>().ldlt().solve(difference));
   error.scale_valid = estimate.scale_valid;
   return error;
@@ -94,6 +95,8 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
       errors.empty() ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(errors.size());
   summary.nees_mean = nees / count;
   summary.rotation_nees_mean = rotation_nees / count;
+  summary.good = good;
+  summary.bad = bad;
   summary.valid_where_good = share(good_valid, good);
   summary.invalid_where_bad = share(bad_invalid, bad);
   return summary;

@@ -30,6 +30,7 @@ struct MotionError {
   double baseline = 0;            ///< true distance, m
   double estimated_baseline = 0;  ///< m
   double sigma = 0;               ///< predicted: root of the trace of the translation's covariance, m
+  double tail_sigma = 0;          ///< scale of the tail of the norm: root of tr P² / tr P, m
   double nees = 0;                ///< normalised error squared of the translation, 3 degrees of freedom
   double rotation_nees = 0;       ///< the same of the rotation
   bool scale_valid = false;
@@ -48,6 +49,8 @@ struct MotionSummary {
   double rotation_95 = 0;         ///< rad
   double nees_mean = 0;           ///< of the translation, 3 expected
   double rotation_nees_mean = 0;  ///< 3 expected
+  std::size_t good = 0;           ///< pairs with an error under 10 % of the baseline
+  std::size_t bad = 0;            ///< over 20 %
   double valid_where_good =
       0;  ///< share of the pairs with an error under 10 % of the baseline that are scale_valid
   double invalid_where_bad = 0;  ///< share of the pairs with an error over 20 % that are not

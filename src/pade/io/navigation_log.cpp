@@ -297,10 +297,15 @@ Result<GnssLog> parse_gnss(std::string_view text, std::string_view name, const G
   for (std::size_t row = 0; row < table->rows(); ++row) {
     const auto time = layout->clock.at(*table, row);
     Vector3d position = vector_at(*table, row, layout->position);
-    Vector3d velocity = vector_at(*table, row, layout->velocity);
+    const Vector3d velocity = vector_at(*table, row, layout->velocity);
+    const Matrix3d position_covariance =
+        covariance_at(*table, row, layout->position_sigma, 3, layout->ned, position_sigma);
+    const Matrix3d velocity_covariance = covariance_at(
+        *table, row, layout->velocity_sigma, layout->velocity_sigma_count, layout->ned, velocity_sigma);
     const bool on_earth = !layout->geodetic || (std::abs(position[0]) <= 90 && std::abs(position[1]) <= 540);
-    const bool has_fix = position.allFinite() && on_earth;
-    if (!time || (!has_fix && !velocity.allFinite())) {
+    const bool has_fix = position.allFinite() && on_earth && position_covariance.allFinite();
+    const bool has_velocity = velocity.allFinite() && velocity_covariance.allFinite();
+    if (!time || (!has_fix && !has_velocity)) {
       ++left_out;
       continue;
     }
@@ -315,15 +320,10 @@ Result<GnssLog> parse_gnss(std::string_view text, std::string_view name, const G
       } else if (layout->ned) {
         position = enu_from_ned(position);
       }
-      log.fixes.push_back(
-          {*time, position,
-           covariance_at(*table, row, layout->position_sigma, 3, layout->ned, position_sigma)});
+      log.fixes.push_back({*time, position, position_covariance});
     }
-    if (velocity.allFinite()) {
-      if (layout->ned) velocity = enu_from_ned(velocity);
-      log.velocities.push_back({*time, velocity,
-                                covariance_at(*table, row, layout->velocity_sigma,
-                                              layout->velocity_sigma_count, layout->ned, velocity_sigma)});
+    if (has_velocity) {
+      log.velocities.push_back({*time, layout->ned ? enu_from_ned(velocity) : velocity, velocity_covariance});
     }
   }
   // A log at the rate of another sensor repeats each epoch.
@@ -349,11 +349,12 @@ Result<std::vector<BarometricHeight>> parse_barometer(std::string_view text, std
   for (std::size_t row = 0; row < table->rows(); ++row) {
     const auto time = parse_time(table->stamps[row]);
     const double value = table->at(row, *height);
-    if (!time || !std::isfinite(value)) {
+    const double deviation = sigma ? table->at(row, *sigma) : 0.3;
+    if (!time || !std::isfinite(value) || !std::isfinite(deviation)) {
       ++left_out;
       continue;
     }
-    samples.push_back({*time, value, sigma ? table->at(row, *sigma) : 0.3});
+    samples.push_back({*time, value, deviation});
   }
   remark_left_out(*table, left_out, remarks);
   return samples;

@@ -35,7 +35,9 @@ FilterOptions FilterOptions::of(ImuClass imu) {
   if (imu == ImuClass::consumer) {
     options.gyroscope_noise = 1e-4;
     options.gyroscope_vibration = 0.2;
+    options.accelerometer_vibration = 0.35;
     options.gyroscope_bias_walk = 3e-5;
+    options.accelerometer_bias_walk = 1e-3;
     options.accelerometer_bias_sigma = 0.3;
   }
   return options;

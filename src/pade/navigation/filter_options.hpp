@@ -21,9 +21,9 @@ struct FilterOptions {
   double gyroscope_noise = 2.4e-4;        ///< rad/s/sqrt(Hz)
   double accelerometer_noise = 2e-2;      ///< m/s²/sqrt(Hz)
   double gyroscope_vibration = 0.15;      ///< share
-  double accelerometer_vibration = 0.35;  ///< share
+  double accelerometer_vibration = 0.45;  ///< share
   double gyroscope_bias_walk = 2e-4;      ///< rad/s/sqrt(s)
-  double accelerometer_bias_walk = 1e-3;  ///< m/s²/sqrt(s)
+  double accelerometer_bias_walk = 2e-3;  ///< m/s²/sqrt(s)
   double gyroscope_bias_sigma = 0.05;     ///< before the first levelling, rad/s
   double accelerometer_bias_sigma = 0.1;  ///< m/s²
   double gyroscope_range = 17;            ///< a sample beyond it is saturated, rad/s

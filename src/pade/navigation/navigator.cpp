@@ -17,6 +17,9 @@ Time shifted(Time time, double seconds) {
   return Time{time.nanoseconds + Time::from_seconds(seconds).nanoseconds};
 }
 
+/// Scale of the tail of |e| for errors e of covariance P: by moments |e|² is c χ², c = tr P² / tr P.
+double tail_sigma(const Matrix3d& P) { return std::sqrt(P.squaredNorm() / P.trace()); }
+
 /// Buffers reach back over the history, the levelling window and what the bank of hypotheses waits for.
 double buffered_seconds(const NavigatorOptions& options) {
   return options.history + options.alignment.level_time + options.alignment.motion_window +
@@ -187,7 +190,7 @@ RelativePose Navigator::relative_pose(Time t1, Time t2, const Pose& T_body_camer
   result.motion.t_reference_other = T.translation;
   result.motion.duration = seconds_between(t1, t2);
   result.motion.covariance = turn * local * turn.transpose();
-  const double sigma = std::sqrt(result.motion.covariance.topLeftCorner<3, 3>().trace());
+  const double sigma = tail_sigma(result.motion.covariance.topLeftCorner<3, 3>());
   result.scale_valid =
       result.status >= NavigationStatus::yaw_known &&
       options_.scale_error_limit * T.translation.norm() > options_.scale_error_sigmas * sigma;

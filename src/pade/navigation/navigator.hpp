@@ -33,7 +33,7 @@ struct NavigatorOptions {
   double dead_reckoning_after = 1;             ///< seconds without GNSS velocity
   double longest_gap = 3;                      ///< without IMU data; beyond it the filter starts anew, s
   double scale_error_limit = 0.2;              ///< of the baseline: the noise bound of the paper
-  double scale_error_sigmas = 1.68;            ///< `scale_valid` asks for limit * baseline > this * sigma
+  double scale_error_sigmas = 2.6;             ///< `scale_valid` asks for limit * baseline > this * sigma
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
