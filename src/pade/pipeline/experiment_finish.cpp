@@ -119,18 +119,19 @@ Section flight_section(const Results& results) {
   table.title = "Figure 4: a flight toward a building";
   table.command = command_of(results.options, table.name);
   table.note = fmt::format(
-      "At each moment from left to right: camera image, optical flow to the frame before (direction as hue, "
-      "full "
-      "colour at {:g} px), depth (red near, blue {:g} m and farther, grey none); in report.html below it the "
-      "occupancy "
-      "map so far, from above and from the side.",
-      json.at("flow_scale_px").get<double>(), json.at("depth_scale_m").get<double>());
-  table.columns = {"moment", "time s", "flown m"};
+      "At each moment from left to right: camera image, optical flow to the frame before (direction as hue), "
+      "depth (red "
+      "near, blue {:g} m and farther, grey none); in report.html below it the occupancy map so far, from "
+      "above and from "
+      "the side.",
+      json.at("depth_scale_m").get<double>());
+  table.columns = {"moment", "time s", "flown m", "full colour of flow px"};
   for (const Json& moment : json.at("moments")) {
     const auto number = made.figures.size() + 1;
     const auto flown = moment.at("flown_m").get<double>();
-    table.rows.push_back(
-        {std::to_string(number), moment.at("time").get<std::string>(), fmt::format("{:.1f}", flown)});
+    table.rows.push_back({std::to_string(number), moment.at("time").get<std::string>(),
+                          fmt::format("{:.1f}", flown),
+                          fmt::format("{:g}", moment.at("flow_scale_px").get<double>())});
     made.figures.push_back(
         {fmt::format("figure4-{}.jpg", number), fmt::format("After {:.1f} m", flown), "",
          moment.at("strip").get<std::string>(),

@@ -59,28 +59,27 @@ cv::Mat in_colour(const cv::Mat& image) {
 
 std::string to_json(const std::vector<Moment>& moments, double range) {
   double depth_scale = 0;
-  double flow_scale = 0;
-  for (const Moment& moment : moments) {
+  for (const Moment& moment : moments)
     depth_scale = std::max(depth_scale, evaluation::finite_quantile(moment.depth, 0.97));
-    flow_scale = std::max(flow_scale, io::flow_full_scale(moment.flow));
-  }
   depth_scale = std::min(range, evaluation::round_up_125(depth_scale));
   Json list = Json::array();
   for (const Moment& moment : moments) {
     const cv::Mat depth =
         evaluation::colourise(moment.depth, 0, depth_scale, evaluation::Palette::turbo_near_warm);
+    const double flow_scale =
+        io::flow_full_scale(moment.flow);  // of its own: near the wall flow is ten times larger
     cv::Mat strip;
     cv::hconcat(
         std::vector<cv::Mat>{in_colour(moment.image), io::flow_colors(moment.flow, flow_scale), depth},
         strip);
     list.push_back({{"time", to_string(moment.time)},
                     {"flown_m", moment.flown},
+                    {"flow_scale_px", flow_scale},
                     {"strip", evaluation::jpeg_uri(strip, kStripWidth)},
                     {"map_top", moment.map.top},
                     {"map_side", moment.map.side}});
   }
   const Json json = {{"depth_scale_m", depth_scale},
-                     {"flow_scale_px", flow_scale},
                      {"height_bar", moments.empty() ? "" : moments.back().map.height_bar},
                      {"moments", std::move(list)}};
   return json.dump();
