@@ -154,9 +154,12 @@ std::vector<Section> sections_of(const Results& results, const std::vector<Verdi
   }
   if (results.has("figure3"))
     sections.push_back(section(results, figure3_table(results), {figure3_by_range, figure3_by_level}));
-  if (results.has("table1") || results.has("figure3"))
-    sections.push_back(section(results, comparison_table(results, pade_literal)));
-  if (results.has("table1")) sections.push_back(section(results, comparison_table(results, pade_exact)));
+  if (results.has("table1")) {
+    sections.push_back(section(results, comparison_table(results, pade_literal, "table1")));
+    sections.push_back(section(results, comparison_table(results, pade_exact, "table1")));
+  }
+  if (results.has("figure3"))
+    sections.push_back(section(results, comparison_table(results, pade_literal, "figure3")));
   if (!results.flight.empty()) sections.push_back(flight_section(results));
   if (results.has("windows")) sections.push_back(section(results, windows_table(results), {windows_plots}));
   if (results.has("errata")) sections.push_back(section(results, errata_table(results)));

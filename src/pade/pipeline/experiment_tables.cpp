@@ -346,45 +346,66 @@ ResultTable errata_table(const Results& results) {
   return table;
 }
 
-std::vector<evaluation::ErrorRow> error_rows(const Results& results, std::string_view pade) {
-  std::vector<evaluation::ErrorRow> rows;
+namespace {
+
+/// Clean motion, on all pixels.
+void add_table1_rows(const Results& results, const std::string& flow, std::string_view pade,
+                     std::vector<evaluation::ErrorRow>& rows) {
   const std::string_view rival = pade == pade_exact ? ttc_exact : ttc;
-  const auto noisy = [&](const std::string& flow) {
-    return results.has("figure3") && pade == pade_literal &&
-           !results.cells("figure3", flow, pade, {}).empty();
-  };
-  if (results.has("table1")) {
-    for (const std::string& flow : flows_of(results.options, "table1")) {
-      if (!noisy(flow))
-        add_error_rows(results, "table1", flow, rival, pade, {}, evaluation::NoiseOn::motion, rows);
-    }
-  }
-  if (!results.has("figure3") || pade != pade_literal) return rows;
+  add_error_rows(results, "table1", flow, rival, pade, {}, evaluation::NoiseOn::motion, rows);
+}
+
+/// Literal PADE without noise and with all of its levels, on a grid of pixels.
+void add_figure3_rows(const Results& results, std::vector<evaluation::ErrorRow>& rows) {
   std::vector<std::string> flows = flows_of(results.options, "figure3");
   for (const std::string& flow : other_noisy_flows(results.options)) flows.push_back(flow);
   for (const std::string& flow : flows) {
     for (const double level : noise_levels) {
       const MotionNoise noise{NoiseModel::multiplicative, level};
-      add_error_rows(results, "figure3", flow, ttc, pade, noise, evaluation::NoiseOn::motion, rows);
-      if (level > 0)
-        add_error_rows(results, "figure3", flow, ttc_velocity, pade, noise, evaluation::NoiseOn::velocity,
-                       rows);
+      add_error_rows(results, "figure3", flow, ttc, pade_literal, noise, evaluation::NoiseOn::motion, rows);
+      if (level > 0) {
+        add_error_rows(results, "figure3", flow, ttc_velocity, pade_literal, noise,
+                       evaluation::NoiseOn::velocity, rows);
+      }
     }
   }
+}
+
+}  // namespace
+
+std::vector<evaluation::ErrorRow> error_rows(const Results& results, std::string_view pade) {
+  std::vector<evaluation::ErrorRow> rows;
+  const bool noise = results.has("figure3") && pade == pade_literal;
+  if (results.has("table1")) {
+    for (const std::string& flow : flows_of(results.options, "table1")) {
+      if (!noise || results.cells("figure3", flow, pade, {}).empty())
+        add_table1_rows(results, flow, pade, rows);
+    }
+  }
+  if (noise) add_figure3_rows(results, rows);
   return rows;
 }
 
-ResultTable comparison_table(const Results& results, std::string_view pade) {
-  const bool literal = pade == pade_literal;
-  ResultTable table =
-      make(results, results.has("table1") ? "table1" : "figure3",
-           fmt::format("{} against TTC: TTC's error less PADE's", shown_name(pade)),
-           "Difference of the mean errors in m, mean over sequences with its 95 % bootstrap interval over "
-           "sequences: positive "
-           "where PADE is ahead. Sequences where TTC has no answer are left out. Noise is multiplicative.");
-  table.name = literal ? "comparison-literal" : "comparison-exact";
+ResultTable comparison_table(const Results& results, std::string_view pade, std::string_view source) {
+  const bool clean = source == "table1";
+  std::vector<evaluation::ErrorRow> rows;
+  if (clean) {
+    for (const std::string& flow : flows_of(results.options, source))
+      add_table1_rows(results, flow, pade, rows);
+  } else {
+    add_figure3_rows(results, rows);
+  }
+  ResultTable table = make(
+      results, std::string(source),
+      fmt::format("{} against TTC{}: TTC's error less PADE's", shown_name(pade), clean ? "" : " under noise"),
+      fmt::format(
+          "Difference of the mean errors in m, mean over sequences with its 95 % bootstrap interval over "
+          "sequences: positive where PADE is ahead. Sequences where TTC has no answer are left out.{}",
+          clean ? "" : " Noise is multiplicative; every 4th pixel and row."));
+  table.name =
+      fmt::format("comparison-{}{}", pade == pade_literal ? "literal" : "exact", clean ? "" : "-noise");
   table.columns = range_columns({"flow", "p", "pixels"});
-  for (const evaluation::Comparison& comparison : evaluation::compare_methods(error_rows(results, pade))) {
+  for (const evaluation::Comparison& comparison : evaluation::compare_methods(rows)) {
     for (const bool common : {true, false}) {
       std::vector<std::string> row = {comparison.flow, fmt::format("{:.0f} %", 100 * comparison.noise),
                                       common ? "both answer" : "all"};

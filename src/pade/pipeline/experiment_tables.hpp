@@ -26,8 +26,10 @@ evaluation::ResultTable figure3_table(const Results& results);
 evaluation::ResultTable windows_table(const Results& results);
 /// The paper's equations put right one after the other.
 evaluation::ResultTable errata_table(const Results& results);
-/// TTC's error less PADE's, where both answer and on all pixels. `pade` is pade-literal or pade-exact.
-evaluation::ResultTable comparison_table(const Results& results, std::string_view pade);
+/// TTC's error less PADE's, where both answer and on all pixels. `pade` is pade-literal or pade-exact;
+/// `source` is table1 (clean motion, all flows) or figure3 (literal alone, with noise).
+evaluation::ResultTable comparison_table(const Results& results, std::string_view pade,
+                                         std::string_view source);
 
 /// Every cell of every job by sequence and range.
 evaluation::DataTable all_cells(const Results& results);
