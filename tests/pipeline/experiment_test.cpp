@@ -183,6 +183,32 @@ TEST_F(ExperimentRun, MergingTooFewShardsNamesWhatIsMissing) {
   EXPECT_FALSE(fs::exists(root_->path() / "incomplete" / finished_file));
 }
 
+TEST_F(ExperimentRun, ADamagedJobIsNamedAndNeverACrash) {
+  fs::copy(root_->path() / "whole", root_->path() / "damaged", fs::copy_options::recursive);
+  std::set<std::string> tried;
+  for (const auto& entry : fs::directory_iterator(root_->path() / "damaged" / "jobs")) {
+    const std::string name = entry.path().stem();
+    if (!tried.insert(name.substr(0, name.find('-'))).second) continue;  // one of each table
+    std::ostringstream whole;
+    whole << std::ifstream(entry.path()).rdbuf();
+    std::string renamed = whole.str();
+    for (const std::string key : {"\"flown_m\"", "\"truth\""}) {
+      for (auto at = renamed.find(key); at != std::string::npos; at = renamed.find(key))
+        renamed.replace(at, key.size(), "\"lost\"");
+    }
+    for (const std::string& damaged :
+         {std::string("{}"), whole.str().substr(0, whole.str().size() / 2), renamed}) {
+      std::ofstream(entry.path()) << damaged;
+      const auto store = Store::open(root_->path() / "damaged", true);
+      const auto text = finish(*experiment_, *store);
+      ASSERT_FALSE(text.ok()) << name;
+      EXPECT_THAT(text.error().message, HasSubstr(name));
+    }
+    std::ofstream(entry.path()) << whole.str();
+  }
+  EXPECT_TRUE(tried.contains("figure4"));
+}
+
 TEST_F(ExperimentRun, ATableMadeAloneHasTheFiguresOfTheWhole) {
   Experiment alone = *experiment_;
   alone.options.tables = "table1";

@@ -135,4 +135,20 @@ Result<std::string> run_flight(const Job& job, const io::Sequence& sequence,
   return to_json(moments, job.range);
 }
 
+Status check_flight(std::string_view text, std::string_view file) {
+  try {  // nlohmann reports by exceptions; they end here
+    const Json json = Json::parse(text);
+    static_cast<void>(json.at("depth_scale_m").get<double>());
+    for (const Json& moment : json.at("moments")) {
+      for (const char* number : {"flown_m", "flow_scale_px"})
+        static_cast<void>(moment.at(number).get<double>());
+      for (const char* name : {"time", "strip", "map_top", "map_side"})
+        static_cast<void>(moment.at(name).get<std::string>());
+    }
+    return {};
+  } catch (const Json::exception& error) {
+    return Error{fmt::format("{}: found {}, expected the moments of a flight", file, error.what())};
+  }
+}
+
 }  // namespace pade::experiment

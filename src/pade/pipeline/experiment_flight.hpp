@@ -20,4 +20,7 @@ std::optional<Job> flight_job(const PlanOptions& options, const std::vector<std:
 Result<std::string> run_flight(const Job& job, const io::Sequence& sequence,
                                const std::function<bool()>& go_on);
 
+/// Refuses what run_flight did not write. `file` is named in the error.
+Status check_flight(std::string_view text, std::string_view file);
+
 }  // namespace pade::experiment

@@ -73,8 +73,10 @@ Result<Results> read_results(const Experiment& experiment, const Store& store) {
     results.jobs.push_back({job, std::move(result).value()});
   }
   if (const auto flight = flight_job(experiment.options, results.sequences)) {
-    auto text = result_in(store, job_name(*flight, fingerprints[flight->sequence]), false);
+    const std::string name = job_name(*flight, fingerprints[flight->sequence]);
+    auto text = result_in(store, name, false);
     if (!text) return text.error();
+    if (const Status fits = check_flight(*text, name); !fits) return fits.error();
     results.flight = std::move(text).value();
   }
   for (const Job& job : timing_plan(experiment.options, results.sequences)) {
