@@ -109,7 +109,7 @@ TEST_F(KilledSimulation, TenTimesAtRandomMomentsGoesOnToTheSameBytes) {
     kill(child, SIGKILL);
     if (!WIFSIGNALED(wait_for(child))) break;  // it was quicker
     ++killed;
-    ASSERT_FALSE(fs::exists(out)) << "an unfinished sequence was put in place";
+    if (fs::exists(out)) break;  // killed between the end and the exit: it must be whole, see below
     for (const auto& [file, when] : finished) {
       ASSERT_TRUE(fs::exists(unfinished / file)) << file << " was finished before";
       EXPECT_EQ(fs::last_write_time(unfinished / file), when) << file << " was made again";
