@@ -54,13 +54,14 @@ ResultTable verdict_table(const Results& results, std::string name, std::string 
 }
 
 /// The claims whose outcome depends on the errata: both methods as printed, and both put right.
-ResultTable changed_outcomes_table(const Results& results, const std::vector<Verdict>& printed) {
+ResultTable changed_outcomes_table(const Results& results) {
   ResultTable table;
   table.name = "errata-outcomes";
   table.title = "Claims whose outcome changes when the errata are switched on";
   table.command = command_of(results.options, "table1");
   table.columns = {"claim", "literal PADE against TTC", "exact PADE against exact TTC"};
-  const auto right = evaluation::judge_accuracy(error_rows(results, pade_exact), verdict_options());
+  const auto printed = evaluation::judge_accuracy(clean_rows(results, pade_literal), verdict_options());
+  const auto right = evaluation::judge_accuracy(clean_rows(results, pade_exact), verdict_options());
   for (const evaluation::OutcomeChange& change : evaluation::changed_outcomes(printed, right)) {
     if (change.before == evaluation::Outcome::not_tested || change.after == evaluation::Outcome::not_tested)
       continue;
@@ -163,7 +164,7 @@ std::vector<Section> sections_of(const Results& results, const std::vector<Verdi
   if (!results.flight.empty()) sections.push_back(flight_section(results));
   if (results.has("windows")) sections.push_back(section(results, windows_table(results), {windows_plots}));
   if (results.has("errata")) sections.push_back(section(results, errata_table(results)));
-  if (results.has("table1")) sections.push_back({changed_outcomes_table(results, verdicts)});
+  if (results.has("table1")) sections.push_back({changed_outcomes_table(results)});
   return sections;
 }
 

@@ -373,6 +373,13 @@ void add_figure3_rows(const Results& results, std::vector<evaluation::ErrorRow>&
 
 }  // namespace
 
+std::vector<evaluation::ErrorRow> clean_rows(const Results& results, std::string_view pade) {
+  std::vector<evaluation::ErrorRow> rows;
+  for (const std::string& flow : flows_of(results.options, "table1"))
+    add_table1_rows(results, flow, pade, rows);
+  return rows;
+}
+
 std::vector<evaluation::ErrorRow> error_rows(const Results& results, std::string_view pade) {
   std::vector<evaluation::ErrorRow> rows;
   const bool noise = results.has("figure3") && pade == pade_literal;
@@ -390,8 +397,7 @@ ResultTable comparison_table(const Results& results, std::string_view pade, std:
   const bool clean = source == "table1";
   std::vector<evaluation::ErrorRow> rows;
   if (clean) {
-    for (const std::string& flow : flows_of(results.options, source))
-      add_table1_rows(results, flow, pade, rows);
+    rows = clean_rows(results, pade);
   } else {
     add_figure3_rows(results, rows);
   }

@@ -34,7 +34,9 @@ evaluation::ResultTable comparison_table(const Results& results, std::string_vie
 /// Every cell of every job by sequence and range.
 evaluation::DataTable all_cells(const Results& results);
 
-/// What the verdicts are made of.
+/// Both methods of table 1 side by side: clean motion, all pixels.
+std::vector<evaluation::ErrorRow> clean_rows(const Results& results, std::string_view pade);
+/// What the verdicts are made of: those, and the noise of figure 3 where it is there.
 std::vector<evaluation::ErrorRow> error_rows(const Results& results, std::string_view pade);
 
 /// Means over draws and sequences of figure 3: per range a mean and the spread of the draws.
