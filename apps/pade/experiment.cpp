@@ -1,5 +1,6 @@
 // `pade experiment`: the tables and figures of the paper, on the simulated set or on recordings.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -122,6 +123,8 @@ Status finish(const ExperimentArguments& arguments, const Experiment& experiment
 }
 
 Status run_tables(const ExperimentArguments& arguments) {
+  if (!std::isfinite(arguments.plan.range))
+    return Error{fmt::format("--range: found {}, expected metres above 0", arguments.plan.range)};
   const auto share = share_of(arguments);
   if (!share) return share.error();
   if (!arguments.folders.empty()) {
