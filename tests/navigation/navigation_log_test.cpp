@@ -160,6 +160,15 @@ TEST(GnssLog, LeavesOutWhatHasNoFiniteSigma) {
   EXPECT_THAT(remarks[0], HasSubstr("1 of 3 rows left out"));
 }
 
+TEST(GnssLog, SigmasThatRunOutOfTheTableAreRefused) {
+  std::vector<std::string> remarks;
+  const auto read = parse_gnss("# t_s,pN_m,pE,pD,vN_mps,vE,vD,sN,sE,sD,svN\n0,1,2,3,4,5,6,7,8,9,10\n", "gnss.csv", {},
+                               remarks);
+  ASSERT_FALSE(read.ok());
+  EXPECT_NE(read.error().message.find("gnss.csv: 3 columns expected from 'svN' on, found 1"), std::string::npos)
+      << read.error().message;
+}
+
 TEST(GnssLog, RefusesAFileWithoutFrame) {
   std::vector<std::string> remarks;
   const auto read =

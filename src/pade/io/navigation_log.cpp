@@ -196,6 +196,16 @@ Result<GnssLayout> gnss_layout(const NumericTable& table) {
     column = *found;
     return {};
   };
+  Status sigmas;
+  const auto take_sigmas = [&](std::string_view prefix, std::size_t count, std::optional<std::size_t>& column) {
+    if (!table.column(prefix)) return;
+    const auto found = table.group(prefix, count);
+    if (found) {
+      column = *found;
+    } else if (sigmas.ok()) {
+      sigmas = found.error();
+    }
+  };
   Status position;
   Status velocity;
   if (table.column("GNSS1::PosLla")) {  // VectorNav export
@@ -203,16 +213,16 @@ Result<GnssLayout> gnss_layout(const NumericTable& table) {
     layout.ned = layout.geodetic = true;
     position = take("GNSS1::PosLla", layout.position);
     velocity = take("GNSS1::VelNed", layout.velocity);
-    layout.position_sigma = table.column("GNSS1::PosU");
-    layout.velocity_sigma = table.column("GNSS1::VelU");
     layout.velocity_sigma_count = 1;
+    take_sigmas("GNSS1::PosU", 3, layout.position_sigma);
+    take_sigmas("GNSS1::VelU", 1, layout.velocity_sigma);
   } else if (table.column("pN_m") || (table.column("lat_deg") && table.column("vN_mps"))) {  // the recordings
     layout.ned = true;
     layout.geodetic = !table.column("pN_m");
     position = take(layout.geodetic ? "lat_deg" : "pN_m", layout.position);
     velocity = take("vN_mps", layout.velocity);
-    layout.position_sigma = table.column("sN");
-    layout.velocity_sigma = table.column("svN");
+    take_sigmas("sN", 3, layout.position_sigma);
+    take_sigmas("svN", 3, layout.velocity_sigma);
   } else {
     const bool enu = table.comment.find("frame=ENU") != std::string::npos;
     layout.ned = table.comment.find("frame=NED") != std::string::npos;
@@ -228,6 +238,7 @@ Result<GnssLayout> gnss_layout(const NumericTable& table) {
   }
   if (!position.ok()) return position.error();
   if (!velocity.ok()) return velocity.error();
+  if (!sigmas.ok()) return sigmas.error();
   return layout;
 }
 
