@@ -162,10 +162,11 @@ TEST(GnssLog, LeavesOutWhatHasNoFiniteSigma) {
 
 TEST(GnssLog, SigmasThatRunOutOfTheTableAreRefused) {
   std::vector<std::string> remarks;
-  const auto read = parse_gnss("# t_s,pN_m,pE,pD,vN_mps,vE,vD,sN,sE,sD,svN\n0,1,2,3,4,5,6,7,8,9,10\n", "gnss.csv", {},
-                               remarks);
+  const auto read = parse_gnss("# t_s,pN_m,pE,pD,vN_mps,vE,vD,sN,sE,sD,svN\n0,1,2,3,4,5,6,7,8,9,10\n",
+                               "gnss.csv", {}, remarks);
   ASSERT_FALSE(read.ok());
-  EXPECT_NE(read.error().message.find("gnss.csv: 3 columns expected from 'svN' on, found 1"), std::string::npos)
+  EXPECT_NE(read.error().message.find("gnss.csv: 3 columns expected from 'svN' on, found 1"),
+            std::string::npos)
       << read.error().message;
 }
 

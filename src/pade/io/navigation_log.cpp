@@ -197,7 +197,8 @@ Result<GnssLayout> gnss_layout(const NumericTable& table) {
     return {};
   };
   Status sigmas;
-  const auto take_sigmas = [&](std::string_view prefix, std::size_t count, std::optional<std::size_t>& column) {
+  const auto take_sigmas = [&](std::string_view prefix, std::size_t count,
+                               std::optional<std::size_t>& column) {
     if (!table.column(prefix)) return;
     const auto found = table.group(prefix, count);
     if (found) {

@@ -14,6 +14,17 @@
 
 namespace pade::simulation {
 
+/// What a ray hit: a facet's triangle, a quadric, or nothing.
+struct Primitive {
+  static constexpr std::uint32_t none = 0xffffffff;
+  static constexpr std::uint32_t quadric_bit = 0x80000000;
+  std::uint32_t id = none;
+  [[nodiscard]] bool hit() const { return id != none; }
+  [[nodiscard]] bool is_quadric() const { return (id & quadric_bit) != 0; }
+  [[nodiscard]] std::uint32_t index() const { return id & ~quadric_bit; }
+  bool operator==(const Primitive&) const = default;
+};
+
 /// Linear functions (u, v) of the position: g_u . p + u0, g_v . p + v0.
 struct TextureFrame {
   Eigen::Vector3f gradient_u = Eigen::Vector3f::Zero();

@@ -9,6 +9,7 @@
 
 #include "pade/simulation/parallel.hpp"
 #include "pade/simulation/texture.hpp"
+#include "pade/simulation/truth.hpp"
 
 namespace pade::simulation {
 namespace {
@@ -168,11 +169,17 @@ namespace {
 /// The pixels of one packet: a tile of neighbours, with their samples and the surfaces that these hit.
 class Block {
  public:
-  Block(const Scene& scene, const RayGrid& grid, const Pose& pose,
-        const std::vector<Eigen::Vector2d>& offsets)
-      : scene_(scene), grid_(grid), R_(pose.matrix3()), origin_(pose.translation), offsets_(offsets) {}
+  Block(const Scene& scene, const RayGrid& grid, const Pose& pose, const VisibleSurface& centres,
+        const std::vector<Eigen::Vector2d>& offsets, const std::vector<VisibleSurface>& sampled)
+      : scene_(scene),
+        grid_(grid),
+        R_(pose.matrix3()),
+        origin_(pose.translation),
+        centres_(centres),
+        offsets_(offsets),
+        sampled_(sampled) {}
 
-  void trace(int left, int top);
+  void take(int left, int top);
   void find_fragments(const RenderOptions& options, const Eigen::Vector3d& to_sun);
   void trace_shadows(const Eigen::Vector3d& to_sun);
 
@@ -192,13 +199,13 @@ class Block {
   [[nodiscard]] const Pixel& pixel(int lane) const { return pixels_[static_cast<std::size_t>(lane)]; }
 
  private:
-  void trace_packet(const RayPacket& rays, std::array<Lane, kLanes>& lanes) const;
-
   const Scene& scene_;
   const RayGrid& grid_;
   Eigen::Matrix3d R_;
   Eigen::Vector3d origin_;
+  const VisibleSurface& centres_;
   const std::vector<Eigen::Vector2d>& offsets_;
+  const std::vector<VisibleSurface>& sampled_;  ///< at each offset
   std::array<bool, kLanes> seen_{};
   std::array<Eigen::Vector3d, kLanes> right_;
   std::array<Eigen::Vector3d, kLanes> down_;
@@ -208,16 +215,7 @@ class Block {
   std::array<Pixel, kLanes> pixels_;
 };
 
-void Block::trace_packet(const RayPacket& rays, std::array<Lane, kLanes>& lanes) const {
-  const HitPacket hits = scene_.nearest(rays);
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    lanes[i].primitive = hits.primitive[i];
-    lanes[i].depth = static_cast<double>(hits.distance[i]);
-  }
-}
-
-void Block::trace(int left, int top) {
-  RayPacket centres{};
+void Block::take(int left, int top) {
   for (int lane = 0; lane < kLanes; ++lane) {
     const auto i = static_cast<std::size_t>(lane);
     const int column = left + lane % ray_packet_side;
@@ -225,33 +223,20 @@ void Block::trace(int left, int top) {
     seen_[i] = column < grid_.camera().width && row < grid_.camera().height &&
                grid_.ray(column, row).x() == grid_.ray(column, row).x();
     if (!seen_[i]) continue;
+    const auto look = [&](const VisibleSurface& surface, const Eigen::Vector3d& direction) -> Lane {
+      return {direction,
+              {static_cast<std::uint32_t>(surface.primitive.at<std::int32_t>(row, column))},
+              static_cast<double>(surface.depth.at<float>(row, column))};
+    };
     const Eigen::Vector2d& ray = grid_.ray(column, row);
     const Eigen::Matrix2d step = grid_.step(column, row);
     right_[i] = R_.leftCols<2>() * step.col(0);
     down_[i] = R_.leftCols<2>() * step.col(1);
-    centre_[i].direction = R_ * Eigen::Vector3d(ray.x(), ray.y(), 1);
-    centres.set(lane, origin_, centre_[i].direction, 0, kInfinity);
-  }
-  trace_packet(centres, centre_);
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    if (!seen_[i] || !centre_[i].primitive.hit()) continue;
-    centre_[i].depth =
-        scene_.exact_distance(centre_[i].primitive, origin_, centre_[i].direction, centre_[i].depth);
-  }
-  if (offsets_.size() == 1) {
-    samples_[0] = centre_;
-    return;
-  }
-  for (std::size_t s = 0; s < offsets_.size(); ++s) {
-    RayPacket rays{};
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const auto i = static_cast<std::size_t>(lane);
-      if (!seen_[i]) continue;
-      samples_[s][i].direction =
-          centre_[i].direction + offsets_[s].x() * right_[i] + offsets_[s].y() * down_[i];
-      rays.set(lane, origin_, samples_[s][i].direction, 0, kInfinity);
+    centre_[i] = look(centres_, R_ * Eigen::Vector3d(ray.x(), ray.y(), 1));
+    for (std::size_t s = 0; s < offsets_.size(); ++s) {
+      samples_[s][i] =
+          look(sampled_[s], centre_[i].direction + offsets_[s].x() * right_[i] + offsets_[s].y() * down_[i]);
     }
-    trace_packet(rays, samples_[s]);
   }
 }
 
@@ -321,15 +306,20 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
                            int threads) const {
   const Implementation& self = *implementation_;
   const cv::Size size = grid.camera().size();
-  Rendering out{cv::Mat::zeros(size, CV_32FC3),
-                cv::Mat(size, CV_32FC1, cv::Scalar(std::numeric_limits<double>::quiet_NaN()))};
   const int samples = std::clamp(options.samples, 1, kMostSamples);
   const std::vector<Eigen::Vector2d> offsets = sample_pattern(samples);
   const bool shadows = options.shadows && self.scene.world().sun && self.scene.world().sun->casts_shadows;
-  const auto make_block = [&] { return Block(self.scene, grid, T_world_camera, offsets); };
+  const VisibleSurface centres = visible_surface(self.scene, grid, T_world_camera, threads);
+  std::vector<VisibleSurface> sampled;
+  for (const Eigen::Vector2d& offset : offsets) {
+    sampled.push_back(samples == 1 ? centres
+                                   : visible_surface(self.scene, grid, T_world_camera, threads, offset));
+  }
+  Rendering out{cv::Mat::zeros(size, CV_32FC3), centres.depth};
+  const auto make_block = [&] { return Block(self.scene, grid, T_world_camera, centres, offsets, sampled); };
   parallel_tiles(
       size.width, size.height, ray_packet_side, threads, make_block, [&](Block& block, int left, int top) {
-        block.trace(left, top);
+        block.take(left, top);
         block.find_fragments(options, self.to_sun);
         if (shadows) block.trace_shadows(self.to_sun);
         for (int lane = 0; lane < kLanes; ++lane) {
@@ -347,9 +337,6 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
                      (static_cast<float>(pixel.sky) / static_cast<float>(samples));
           }
           out.radiance.at<cv::Vec3f>(row, column) = {light[0], light[1], light[2]};
-          if (block.centre(lane).primitive.hit()) {
-            out.depth.at<float>(row, column) = static_cast<float>(block.centre(lane).depth);
-          }
         }
       });
   return out;

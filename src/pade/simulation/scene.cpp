@@ -143,6 +143,7 @@ struct Scene::Implementation {
   Device embree;
   std::size_t lanes = 1;  // rays that the machine traces together
   std::unique_ptr<AmbientOcclusion> occlusion;
+  std::unique_ptr<Rasteriser> rasteriser;
 
   Status attach();
   void attach_triangles(unsigned id, std::size_t first, std::size_t last, unsigned mask) const;
@@ -224,11 +225,13 @@ Result<Scene> Scene::build(World world) {
   inside.world = std::move(world);
   inside.geometry = std::move(geometry).value();
   if (const Status status = inside.attach(); !status) return status.error();
+  inside.rasteriser = std::make_unique<Rasteriser>(inside.geometry);
   return scene;
 }
 
 const World& Scene::world() const { return implementation_->world; }
 const Geometry& Scene::geometry() const { return implementation_->geometry; }
+const Rasteriser& Scene::rasteriser() const { return *implementation_->rasteriser; }
 
 HitPacket Scene::nearest(const RayPacket& rays) const { return implementation_->nearest(rays); }
 

@@ -12,6 +12,7 @@
 
 #include "pade/core/result.hpp"
 #include "pade/simulation/geometry.hpp"
+#include "pade/simulation/rasteriser.hpp"
 #include "pade/simulation/world.hpp"
 
 namespace pade::simulation {
@@ -45,17 +46,6 @@ struct VectorPacket {
   alignas(64) Lanes x, y, z;
 };
 
-/// What a ray hit: a facet's triangle, a quadric, or nothing.
-struct Primitive {
-  static constexpr std::uint32_t none = 0xffffffff;
-  static constexpr std::uint32_t quadric_bit = 0x80000000;
-  std::uint32_t id = none;
-  [[nodiscard]] bool hit() const { return id != none; }
-  [[nodiscard]] bool is_quadric() const { return (id & quadric_bit) != 0; }
-  [[nodiscard]] std::uint32_t index() const { return id & ~quadric_bit; }
-  bool operator==(const Primitive&) const = default;
-};
-
 struct HitPacket {
   alignas(64) std::array<float, ray_packet_size> distance;
   std::array<Primitive, ray_packet_size> primitive;
@@ -80,6 +70,7 @@ class Scene {
 
   [[nodiscard]] const World& world() const;
   [[nodiscard]] const Geometry& geometry() const;
+  [[nodiscard]] const Rasteriser& rasteriser() const;
 
   [[nodiscard]] HitPacket nearest(const RayPacket& rays) const;
   enum class Blockers { everything, shadow_casters };

@@ -28,14 +28,14 @@ void over_tile(const RayGrid& grid, int left, int top, const Work& work) {
 
 /// The rays of a tile in the world; lanes outside the lens are left out, those outside the image repeat its
 /// rim.
-void tile_rays(const RayGrid& grid, const Eigen::Matrix3d& R, const Eigen::Vector3f& origin, int left,
-               int top, VectorPacket& directions, RayPacket& rays) {
+void tile_rays(const RayGrid& grid, const Eigen::Matrix3d& R, const Eigen::Vector3f& origin,
+               const Eigen::Vector2d& offset, int left, int top, VectorPacket& directions, RayPacket& rays) {
   const Camera& camera = grid.camera();
   for (int lane = 0; lane < ray_packet_size; ++lane) {
     const int column = std::min(left + lane % kSide, camera.width - 1);
     const int row = std::min(top + lane / kSide, camera.height - 1);
     const auto i = static_cast<std::size_t>(lane);
-    const Eigen::Vector2d& ray = grid.ray(column, row);
+    const Eigen::Vector2d ray = grid.ray(column, row) + grid.step(column, row) * offset;
     const Eigen::Vector3d direction = R * Eigen::Vector3d(ray.x(), ray.y(), 1);
     directions.x[i] = direction.x();
     directions.y[i] = direction.y();
@@ -52,32 +52,51 @@ void tile_rays(const RayGrid& grid, const Eigen::Matrix3d& R, const Eigen::Vecto
   rays.farthest.fill(kInfinity);
 }
 
-void depth_tile(const Scene& scene, const RayGrid& grid, const Eigen::Matrix3d& R,
-                const Eigen::Vector3d& origin, int left, int top, cv::Mat& depth) {
+void trace_tile(const Scene& scene, const RayGrid& grid, const Eigen::Matrix3d& R,
+                const Eigen::Vector3d& origin, const Eigen::Vector2d& offset, int left, int top,
+                VisibleSurface& out) {
   VectorPacket directions;
   RayPacket rays;
-  tile_rays(grid, R, origin.cast<float>(), left, top, directions, rays);
+  tile_rays(grid, R, origin.cast<float>(), offset, left, top, directions, rays);
   const HitPacket hits = scene.nearest(rays);
   const VectorPacket::Lanes distances = scene.exact_distances(hits, origin, directions);
-  const int columns = std::min(kSide, depth.cols - left);
-  for (int y = 0; y < std::min(kSide, depth.rows - top); ++y) {
-    auto* row = depth.ptr<float>(top + y) + left;
-    for (int x = 0; x < columns; ++x)
-      row[x] = static_cast<float>(distances[static_cast<std::size_t>(y * kSide + x)]);
+  const int columns = std::min(kSide, out.depth.cols - left);
+  for (int y = 0; y < std::min(kSide, out.depth.rows - top); ++y) {
+    auto* depth = out.depth.ptr<float>(top + y) + left;
+    auto* primitive = out.primitive.ptr<std::int32_t>(top + y) + left;
+    for (int x = 0; x < columns; ++x) {
+      const auto lane = static_cast<std::size_t>(y * kSide + x);
+      depth[x] = static_cast<float>(distances[lane]);
+      primitive[x] = static_cast<std::int32_t>(hits.primitive[lane].id);
+    }
   }
 }
 
 }  // namespace
 
-cv::Mat exact_depth(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera, int threads) {
-  cv::Mat depth(grid.camera().size(), CV_32FC1);
+VisibleSurface traced_surface(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera,
+                              int threads, const Eigen::Vector2d& offset) {
+  VisibleSurface out{cv::Mat(grid.camera().size(), CV_32SC1), cv::Mat(grid.camera().size(), CV_32FC1)};
   const Eigen::Matrix3d R = T_world_camera.matrix3();
   parallel_tiles(
-      depth.cols, depth.rows, kSide, threads, [] { return 0; },
+      out.depth.cols, out.depth.rows, kSide, threads, [] { return 0; },
       [&](int, int left, int top) {
-        depth_tile(scene, grid, R, T_world_camera.translation, left, top, depth);
+        trace_tile(scene, grid, R, T_world_camera.translation, offset, left, top, out);
       });
-  return depth;
+  return out;
+}
+
+VisibleSurface visible_surface(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera,
+                               int threads, const Eigen::Vector2d& offset) {
+  if (!grid.camera().is_pinhole()) return traced_surface(scene, grid, T_world_camera, threads, offset);
+  Camera camera = grid.camera();
+  camera.cx -= offset.x();
+  camera.cy -= offset.y();
+  return scene.rasteriser().draw(camera, T_world_camera, threads);
+}
+
+cv::Mat exact_depth(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera, int threads) {
+  return visible_surface(scene, grid, T_world_camera, threads).depth;
 }
 
 ExactFlow exact_flow(const Scene& scene, const RayGrid& grid, const cv::Mat& depth, const Pose& T_world_first,

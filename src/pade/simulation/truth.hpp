@@ -10,8 +10,17 @@
 
 namespace pade::simulation {
 
-/// Depth along the optical axis at the pixel centres, CV_32FC1, metres; NaN where there is nothing (sky,
-/// outside the lens). The ray is traced in single precision and the hit computed again in double.
+/// What is nearest at `offset` from the pixel centres (pixels right and down), found in single precision, and
+/// its depth, computed again in double. Drawn triangle by triangle for a pinhole camera, by rays for any
+/// other lens; the two differ in pixels within rounding of an edge.
+VisibleSurface visible_surface(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera,
+                               int threads = 1, const Eigen::Vector2d& offset = Eigen::Vector2d::Zero());
+/// The same by rays for every camera.
+VisibleSurface traced_surface(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera,
+                              int threads = 1, const Eigen::Vector2d& offset = Eigen::Vector2d::Zero());
+
+/// Depth of visible_surface(): along the optical axis at the pixel centres, CV_32FC1, metres; NaN where there
+/// is nothing (sky, outside the lens).
 cv::Mat exact_depth(const Scene& scene, const RayGrid& grid, const Pose& T_world_camera, int threads = 1);
 
 struct ExactFlow {
