@@ -37,7 +37,7 @@ function(pade_add_kernels target)
       target_compile_definitions(${stem}_${isa} PRIVATE PADE_ISA=${isa})
       # Trapping and errno are never used; without them comparisons and square roots vectorise. NaN stays NaN.
       target_compile_options(${stem}_${isa} PRIVATE ${flags_${isa}} -O3 -fno-math-errno -fno-trapping-math
-                                                    -fvisibility=hidden -Wno-psabi)
+                                                    -fvisibility=hidden)
       target_include_directories(${stem}_${isa} PRIVATE ${PROJECT_SOURCE_DIR}/src)
       target_link_libraries(${stem}_${isa} PRIVATE pade_warnings)
       target_sources(${target} PRIVATE $<TARGET_OBJECTS:${stem}_${isa}>)

@@ -1,5 +1,4 @@
-// Compiled once per instruction set (cmake/PadeCompiler.cmake). Vectors of sixteen lanes in the compilers'
-// extension, element-wise and never fused: every set gives the same bits.
+// Compiled once per instruction set (cmake/PadeCompiler.cmake); every set gives the same bits.
 //
 // In the camera's frame, with the camera at the origin, pixels are rays d = (x, y, 1). A ray passes an edge
 // from p to q on the side that
@@ -11,62 +10,13 @@
 // coordinates, 1997).
 #include "pade/simulation/raster_kernels.hpp"
 
-#if defined(__AVX2__)
-#include <immintrin.h>
-#endif
+#include "pade/core/vec.hpp"
 
 namespace pade::simulation::PADE_ISA {
 namespace {
 
-using V [[gnu::vector_size(4 * raster_lanes)]] = float;
-using I [[gnu::vector_size(4 * raster_lanes)]] = int;
-
-#define PADE_INLINE [[gnu::always_inline]] static inline
-
-PADE_INLINE V load(const float* from) {
-  V value;
-  __builtin_memcpy(&value, from, sizeof value);
-  return value;
-}
-PADE_INLINE void store(float* to, V value) { __builtin_memcpy(to, &value, sizeof value); }
-PADE_INLINE V set(float value) { return value - V{}; }
-PADE_INLINE I set(int value) { return value - I{}; }
-PADE_INLINE V min(V a, V b) { return a < b ? a : b; }
-PADE_INLINE V max(V a, V b) { return a > b ? a : b; }
-
-/// Bit i is lane i of a mask of comparisons.
-PADE_INLINE unsigned bits(I mask) {
-#if defined(__AVX512F__)
-  return _mm512_movepi32_mask(__m512i(mask));
-#elif defined(__AVX2__)
-  __m256 halves[2];
-  __builtin_memcpy(halves, &mask, sizeof mask);
-  return static_cast<unsigned>(_mm256_movemask_ps(halves[0])) |
-         static_cast<unsigned>(_mm256_movemask_ps(halves[1])) << 8;
-#else
-  unsigned out = 0;
-  for (int i = 0; i < raster_lanes; ++i) out |= static_cast<unsigned>(mask[i] & 1) << i;
-  return out;
-#endif
-}
-
-PADE_INLINE float least(V a) {
-  a = min(a, __builtin_shuffle(a, I{8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7}));
-  a = min(a, __builtin_shuffle(a, I{4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11}));
-  a = min(a, __builtin_shuffle(a, I{2, 3, 0, 1, 6, 7, 4, 5, 10, 11, 8, 9, 14, 15, 12, 13}));
-  a = min(a, __builtin_shuffle(a, I{1, 0, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 15, 14}));
-  return a[0];
-}
-
-PADE_INLINE V gather(const float* base, I index) {
-#if defined(__AVX512F__)
-  return V(_mm512_mask_i32gather_ps(__m512{}, 0xffff, __m512i(index), base, 4));
-#else
-  V out;
-  for (int i = 0; i < raster_lanes; ++i) out[i] = base[index[i]];
-  return out;
-#endif
-}
+using namespace simd::PADE_ISA;  // NOLINT(google-build-using-namespace): the vocabulary of every kernel
+constexpr int kParts = raster_lanes / kLanes;  // vectors per block and per packet
 
 struct Vec3 {
   V x, y, z;
@@ -79,22 +29,23 @@ PADE_INLINE Vec3 cross(const Vec3& a, const Vec3& b) {
 }
 PADE_INLINE V dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-/// Sixteen triangles ready to draw; `function` are the three edges and the inverse depth over (x, y).
+/// Triangles of a vector ready to draw; `function` are the three edges and the inverse depth over (x, y).
 struct Setup {
   enum { kEdges = 3, kInverseDepth = 3 };
-  alignas(64) float function[4][3][raster_lanes];
-  alignas(64) float nearest[raster_lanes];   ///< largest inverse depth of a corner
-  alignas(64) float farthest[raster_lanes];  ///< smallest
-  alignas(64) int x0[raster_lanes], x1[raster_lanes], y0[raster_lanes], y1[raster_lanes];  ///< blocks
-  unsigned drawn;                                                                          ///< bit per lane
+  alignas(64) float function[4][3][kLanes];
+  alignas(64) float nearest[kLanes];                               ///< largest inverse depth of a corner
+  alignas(64) float farthest[kLanes];                              ///< smallest
+  alignas(64) int x0[kLanes], x1[kLanes], y0[kLanes], y1[kLanes];  ///< blocks
+  unsigned drawn;                                                  ///< bit per lane
 };
 
 PADE_INLINE void set_up(const RasterView& view, const float (&r)[9], const float (&origin)[3],
-                        const TrianglePacket& packet, const RasterTile& tile, Setup& out) {
+                        const TrianglePacket& packet, int first_lane, const RasterTile& tile, Setup& out) {
   Vec3 p[3];
   for (int i = 0; i < 3; ++i) {
-    const Vec3 w = {load(packet.corner[i][0]) - origin[0], load(packet.corner[i][1]) - origin[1],
-                    load(packet.corner[i][2]) - origin[2]};
+    const Vec3 w = {load(packet.corner[i][0] + first_lane) - origin[0],
+                    load(packet.corner[i][1] + first_lane) - origin[1],
+                    load(packet.corner[i][2] + first_lane) - origin[2]};
     p[i] = {r[0] * w.x + r[1] * w.y + r[2] * w.z, r[3] * w.x + r[4] * w.y + r[5] * w.z,
             r[6] * w.x + r[7] * w.y + r[8] * w.z};
   }
@@ -132,13 +83,13 @@ PADE_INLINE void set_up(const RasterView& view, const float (&r)[9], const float
   u1 = min(max(u1, left - 1.0F), right) - left;
   v1 = min(max(v1, top - 1.0F), bottom) - top;
   const auto ceiling = [](V a) {
-    const I whole = __builtin_convertvector(a, I);
-    return whole - (__builtin_convertvector(whole, V) < a);
+    const I whole = truncate(a);
+    return whole - (to_float(whole) < a);
   };
   const I x0 = ceiling(u0);
   const I y0 = ceiling(v0);
-  const I x1 = __builtin_convertvector(u1 + 1.0F, I) - 1;  // u1 may be -1
-  const I y1 = __builtin_convertvector(v1 + 1.0F, I) - 1;
+  const I x1 = truncate(u1 + 1.0F) - 1;  // u1 may be -1
+  const I y1 = truncate(v1 + 1.0F) - 1;
   const I bx0 = x0 >> 2, bx1 = x1 >> 2, by0 = y0 >> 2, by1 = y1 >> 2;
   const V nearest = in_front ? 1.0F / nearest_z : set(__builtin_inff());
   I visible = (x0 <= x1) & (y0 <= y1) & (farthest_z > 0.0F);
@@ -173,8 +124,7 @@ PADE_INLINE void set_up(const RasterView& view, const float (&r)[9], const float
   const Vec3 n = cross(p[1] - p[0], p[2] - p[0]);
   const V from_plane = dot(n, p[0]);
   const V scale = 1.0F / from_plane;
-  const V magnitude = from_plane < 0.0F ? -from_plane : from_plane;
-  out.drawn = bits(visible & (magnitude > 1e-30F));
+  out.drawn = bits(visible & (abs(from_plane) > 1e-30F));
   if (out.drawn == 0) return;
 
   const I towards = from_plane > 0.0F;
@@ -201,15 +151,20 @@ PADE_INLINE void set_up(const RasterView& view, const float (&r)[9], const float
   keep(out.y1, by1);
 }
 
-/// Enters what lies before all else in the lanes of `nearer`.
-PADE_INLINE void keep_nearer(const RasterTile& tile, int block, I nearer, V w, V before, int slot) {
+/// Enters what lies before all else in the lanes of `nearer`, from `pixel` on.
+PADE_INLINE void keep_nearer(const RasterTile& tile, int pixel, I nearer, V w, V before, int slot) {
   I slots;
-  __builtin_memcpy(&slots, tile.slot + block * raster_lanes, sizeof slots);
+  __builtin_memcpy(&slots, tile.slot + pixel, sizeof slots);
   slots = nearer ? set(slot) : slots;
-  __builtin_memcpy(tile.slot + block * raster_lanes, &slots, sizeof slots);
-  const V after = nearer ? w : before;
-  store(tile.inverse_depth + block * raster_lanes, after);
-  tile.farthest_inverse[block] = least(after);
+  __builtin_memcpy(tile.slot + pixel, &slots, sizeof slots);
+  store(tile.inverse_depth + pixel, select(nearer, w, before));
+}
+
+PADE_INLINE void note_farthest(const RasterTile& tile, int block) {
+  const float* w = tile.inverse_depth + block * raster_lanes;
+  V farthest = load(w);
+  for (int part = 1; part < kParts; ++part) farthest = min(farthest, load(w + part * kLanes));
+  tile.farthest_inverse[block] = least(farthest);
 }
 
 struct Triangle {
@@ -218,22 +173,36 @@ struct Triangle {
   int slot;
 };
 
-PADE_INLINE void draw_block(const Triangle& t, V x, const V (&row)[4], const RasterTile& tile, int block) {
+/// The functions of a triangle in a row of blocks, but for what changes with x.
+struct Row {
+  V at[kParts][4];
+};
+
+PADE_INLINE void draw_block(const Triangle& t, const float* x_of_lanes, const Row& row,
+                            const RasterTile& tile, int block) {
   if (t.nearest <= tile.farthest_inverse[block]) return;
-  const V w = min(max(t.x[3] * x + row[3], set(t.farthest)), set(t.nearest));
-  const V before = load(tile.inverse_depth + block * raster_lanes);
-  const I inside = (t.x[0] * x + row[0] >= 0.0F) & (t.x[1] * x + row[1] >= 0.0F) &
-                   (t.x[2] * x + row[2] >= 0.0F) & (w > before);
-  if (bits(inside) == 0) return;
-  keep_nearer(tile, block, inside, w, before, t.slot);
+  bool changed = false;
+  for (int part = 0; part < kParts; ++part) {
+    const V x = load(x_of_lanes + part * kLanes);
+    const V(&f)[4] = row.at[part];
+    const int pixel = block * raster_lanes + part * kLanes;
+    const V w = min(max(t.x[3] * x + f[3], set(t.farthest)), set(t.nearest));
+    const V before = load(tile.inverse_depth + pixel);
+    const I inside = (t.x[0] * x + f[0] >= 0.0F) & (t.x[1] * x + f[1] >= 0.0F) & (t.x[2] * x + f[2] >= 0.0F) &
+                     (w > before);
+    if (bits(inside) == 0) continue;
+    keep_nearer(tile, pixel, inside, w, before, t.slot);
+    changed = true;
+  }
+  if (changed) note_farthest(tile, block);
 }
 
-/// Blocks of a row that the triangle may touch and that it may come before, sixteen at a time.
+/// Blocks of a row that the triangle may touch and that it may come before, a vector of them at a time.
 PADE_INLINE unsigned candidates(const Triangle& t, V x, float y, float width, float height,
                                 const float* farthest_inverse) {
   // Twice the rounding of the sum over the pixels, so that what they would find is not lost.
   constexpr float kSlack = 1e-6F;
-  I maybe;
+  I maybe = set(-1);
   for (int i = 0; i < 4; ++i) {
     const float across = t.x[i] * width;
     const float along = t.y[i] * height;
@@ -241,13 +210,7 @@ PADE_INLINE unsigned candidates(const Triangle& t, V x, float y, float width, fl
         (across > 0 ? across : 0) + (along > 0 ? along : 0) +
         kSlack * (__builtin_fabsf(t.x[i]) + __builtin_fabsf(t.y[i]) + __builtin_fabsf(t.one[i]));
     const V most = t.x[i] * x + (t.y[i] * y + t.one[i]) + reach;
-    if (i == 0) {
-      maybe = most >= 0.0F;
-    } else if (i < 3) {
-      maybe &= most >= 0.0F;
-    } else {
-      maybe &= min(max(most, set(t.farthest)), set(t.nearest)) > load(farthest_inverse);
-    }
+    maybe &= i < 3 ? most >= 0.0F : min(max(most, set(t.farthest)), set(t.nearest)) > load(farthest_inverse);
   }
   return bits(maybe);
 }
@@ -256,12 +219,14 @@ PADE_INLINE void draw(const Triangle& t, const RasterView& view, const RasterTil
                       int y0, int y1) {
   constexpr int kFew = 6;  // blocks in a row: fewer are faster looked at than chosen
   for (int by = y0; by <= y1; ++by) {
-    const V y = load(view.y_of_lanes + (tile.top + by) * raster_lanes);
-    V row[4];
-    for (int i = 0; i < 4; ++i) row[i] = t.y[i] * y + t.one[i];
+    Row row;
+    for (int part = 0; part < kParts; ++part) {
+      const V y = load(view.y_of_lanes + (tile.top + by) * raster_lanes + part * kLanes);
+      for (int i = 0; i < 4; ++i) row.at[part][i] = t.y[i] * y + t.one[i];
+    }
     const int first = by * tile.columns;
     const auto at = [&](int bx) {
-      draw_block(t, load(view.x_of_lanes + (tile.left + bx) * raster_lanes), row, tile, first + bx);
+      draw_block(t, view.x_of_lanes + (tile.left + bx) * raster_lanes, row, tile, first + bx);
     };
     if (x1 - x0 < kFew) {
       for (int bx = x0; bx <= x1; ++bx) at(bx);
@@ -269,12 +234,12 @@ PADE_INLINE void draw(const Triangle& t, const RasterView& view, const RasterTil
     }
     const float width = static_cast<float>(raster_side - 1) / view.fx;
     const float height = static_cast<float>(raster_side - 1) / view.fy;
-    for (int from = x0 & ~(raster_lanes - 1); from <= x1; from += raster_lanes) {
+    for (int from = x0 & ~(kLanes - 1); from <= x1; from += kLanes) {
       unsigned maybe =
           candidates(t, load(view.x_of_blocks + tile.left + from), view.y_of_blocks[tile.top + by], width,
                      height, tile.farthest_inverse + first + from);
       if (from < x0) maybe &= ~0U << (x0 - from);
-      if (from + raster_lanes - 1 > x1) maybe &= (2U << (x1 - from)) - 1;
+      if (from + kLanes - 1 > x1) maybe &= (2U << (x1 - from)) - 1;
       for (; maybe != 0; maybe &= maybe - 1) at(from + __builtin_ctz(maybe));
     }
   }
@@ -289,8 +254,10 @@ void raster_triangles(const RasterView& view, const TrianglePacket* packets, std
   for (int i = 0; i < 9; ++i) r[i] = static_cast<float>(view.rotation[i]);
   for (int i = 0; i < 3; ++i) origin[i] = static_cast<float>(view.origin[i]);
   Setup s;
-  for (std::uint32_t packet = first; packet < last; ++packet) {
-    set_up(view, r, origin, packets[packet], tile, s);
+  for (std::uint32_t part = first * kParts; part < last * kParts; ++part) {
+    const std::uint32_t packet = part / kParts;
+    const int first_lane = static_cast<int>(part % kParts) * kLanes;
+    set_up(view, r, origin, packets[packet], first_lane, tile, s);
     for (unsigned left = s.drawn; left != 0; left &= left - 1) {
       const int lane = __builtin_ctz(left);
       Triangle t;
@@ -301,7 +268,7 @@ void raster_triangles(const RasterView& view, const TrianglePacket* packets, std
       }
       t.nearest = s.nearest[lane];
       t.farthest = s.farthest[lane];
-      t.slot = static_cast<int>(packet) * raster_lanes + lane;
+      t.slot = static_cast<int>(packet) * raster_lanes + first_lane + lane;
       draw(t, view, tile, s.x0[lane], s.x1[lane], s.y0[lane], s.y1[lane]);
     }
   }
@@ -363,11 +330,17 @@ void raster_quadric(const RasterView& view, const QuadricView& quadric, const Ra
           }
         }
       }
-      const V w = load(found);
-      const V before = load(tile.inverse_depth + block * raster_lanes);
-      const I nearer = w > before;
-      if (bits(nearer) == 0) continue;
-      keep_nearer(tile, block, nearer, w, before, static_cast<int>(quadric.slot));
+      bool changed = false;
+      for (int part = 0; part < kParts; ++part) {
+        const int pixel = block * raster_lanes + part * kLanes;
+        const V w = load(found + part * kLanes);
+        const V before = load(tile.inverse_depth + pixel);
+        const I nearer = w > before;
+        if (bits(nearer) == 0) continue;
+        keep_nearer(tile, pixel, nearer, w, before, static_cast<int>(quadric.slot));
+        changed = true;
+      }
+      if (changed) note_farthest(tile, block);
     }
   }
 }
