@@ -90,6 +90,7 @@ TEST_F(Protocol, TwentySeeds) {
   for (const bool carrier : {false, true}) {
     const auto log = recording("mav_mh01", carrier ? "gnss_rtk_5hz.csv" : "gnss_spp_5hz.csv");
     std::vector<double> t95, t50, t95_long, rotation, velocity, tilt, nees, unsafe, lost, kept;
+    std::vector<double> unsafe_long, lost_long, unsafe_all, lost_all;
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
       NavigationProtocol protocol;
       protocol.seed = seed;
@@ -105,6 +106,13 @@ TEST_F(Protocol, TwentySeeds) {
       unsafe.push_back(-f.short_pairs.invalid_where_bad);
       lost.push_back(-f.short_pairs.valid_where_good);
       kept.push_back(-kept_at_95(f.short_errors));
+      unsafe_long.push_back(-f.long_pairs.invalid_where_bad);
+      lost_long.push_back(-f.long_pairs.valid_where_good);
+      auto both = f.short_errors;
+      both.insert(both.end(), f.long_errors.begin(), f.long_errors.end());
+      const auto all = evaluation::summarise(both);
+      unsafe_all.push_back(-all.invalid_where_bad);
+      lost_all.push_back(-all.valid_where_good);
     }
     std::printf(
         "%s, worst of 20 seeds: 0.1 s 95 %% %.3f cm, median %.3f cm; 0.5 s 95 %% %.2f cm; rotation %.4f deg; "
@@ -114,6 +122,10 @@ TEST_F(Protocol, TwentySeeds) {
         carrier ? "RTK" : "SPP", worst(t95), worst(t50), worst(t95_long), worst(rotation), worst(velocity),
         worst(tilt), *std::min_element(nees.begin(), nees.end()), worst(nees), -worst(unsafe), -worst(lost),
         -worst(kept));
+    std::printf(
+        "    scale_valid false where bad / true where good, pairs 0.5 s apart: %.3f / %.3f; pairs of both "
+        "lengths together: %.3f / %.3f\n",
+        -worst(unsafe_long), -worst(lost_long), -worst(unsafe_all), -worst(lost_all));
     EXPECT_LT(worst(t95), carrier ? 0.85 : 1.3);
     EXPECT_LT(worst(t50), 0.6);
     EXPECT_LT(worst(t95_long), 5.8);
@@ -390,7 +402,9 @@ TEST_F(Protocol, CarThroughOutages) {
   for (const bool on_road : {false, true}) {
     for (int k = 0; k < 3; ++k) {
       std::vector<double> drifts;
-      for (double start = 100; start + lengths[k] < 540; start += 15) {  // each outage in a run of its own
+      // Each outage in a run of its own. One every 15 s are too few: for 10 s their median is anything from
+      // 1.2 to 2.4 m, with the moment of the first.
+      for (double start = 100; start + lengths[k] < 540; start += 2) {
         NavigationLog log = full;
         remove_gnss(log, {start}, lengths[k]);
         const auto fix =
@@ -409,10 +423,7 @@ TEST_F(Protocol, CarThroughOutages) {
       std::printf(
           "car%s, outage %2.0f s: horizontal drift median %.2f m (limit %.1f), max %.1f m, %zu windows\n",
           on_road ? " on its wheels" : "", lengths[k], median, limits[k], worst(drifts), drifts.size());
-      // Inertial data alone just misses the 10 s mark over all windows: docs/navigation.md, "Limits".
-      if (on_road || k > 0) {
-        EXPECT_LT(median, limits[k]);
-      }
+      EXPECT_LT(median, limits[k]);
     }
   }
 }

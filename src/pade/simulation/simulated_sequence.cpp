@@ -29,6 +29,9 @@ std::string row(const Eigen::Vector3d& v) {
   return fmt::format("{:.17g} {:.17g} {:.17g}", v.x(), v.y(), v.z());
 }
 
+/// Raised when the renderer gives other bytes for the same world, so that old frames are not mixed with new.
+constexpr int kRendererRevision = 2;
+
 /// Everything that decides the bytes of the sequence, as text.
 std::string record(const Scene& scene, const Flight& flight, const FlightCamera& camera,
                    const SequenceOptions& options) {
@@ -43,6 +46,7 @@ std::string record(const Scene& scene, const Flight& flight, const FlightCamera&
   const Camera& c = camera.camera;
   const nlohmann::ordered_json all = {
       {"made_by", fmt::format("pade {} simulate", version)},
+      {"renderer_revision", kRendererRevision},
       {"world", {{"name", scene.world().name}, {"fingerprint", world_fingerprint(scene.world())}}},
       {"flight",
        {{"name", flight.name},
