@@ -211,7 +211,7 @@ class Block {
   std::array<Eigen::Vector3d, kLanes> down_;
   std::array<Lane, kLanes> centre_;
   std::array<std::array<Lane, kLanes>, kMostSamples> samples_;
-  std::array<std::array<int, kLanes>, kMostSamples> fragment_of_;  ///< of each sample; -1 = sky
+  std::array<std::array<int, kLanes>, kMostSamples> fragment_of_{};  ///< of each sample; -1 = sky
   std::array<Pixel, kLanes> pixels_;
 };
 

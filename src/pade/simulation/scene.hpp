@@ -23,8 +23,9 @@ inline constexpr int ray_packet_size = ray_packet_side * ray_packet_side;
 /// Sixteen rays. With directions of Z = 1 in camera coordinates distances are depths along the optical axis.
 struct RayPacket {
   using Lanes = std::array<float, ray_packet_size>;
-  alignas(64) Lanes origin_x, origin_y, origin_z, direction_x, direction_y, direction_z, nearest, farthest;
-  alignas(64) std::array<int, ray_packet_size> active;  ///< -1 = trace, 0 = leave out
+  alignas(64) Lanes origin_x{}, origin_y{}, origin_z{}, direction_x{}, direction_y{},
+      direction_z{}, nearest{}, farthest{};
+  alignas(64) std::array<int, ray_packet_size> active{};  ///< -1 = trace, 0 = leave out
 
   void set(int lane, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, float from, float to) {
     const auto i = static_cast<std::size_t>(lane);
@@ -43,11 +44,11 @@ struct RayPacket {
 /// Sixteen vectors, axis by axis, in double precision.
 struct VectorPacket {
   using Lanes = std::array<double, ray_packet_size>;
-  alignas(64) Lanes x, y, z;
+  alignas(64) Lanes x{}, y{}, z{};
 };
 
 struct HitPacket {
-  alignas(64) std::array<float, ray_packet_size> distance;
+  alignas(64) std::array<float, ray_packet_size> distance{};
   std::array<Primitive, ray_packet_size> primitive;
 };
 
