@@ -15,7 +15,8 @@ struct Time {
 
   static Time from_seconds(double seconds);
   [[nodiscard]] double seconds() const { return static_cast<double>(nanoseconds) * 1e-9; }
-  auto operator<=>(const Time&) const = default;
+  auto operator<=>(const Time&) const =
+      default;  // NOLINT(modernize-use-nullptr): clang-tidy 14 sees one in it
 };
 
 /// `a - b` in seconds, exact to a nanosecond however large both are.

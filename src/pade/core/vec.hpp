@@ -118,14 +118,14 @@ PADE_INLINE unsigned bits(I mask) {
 // The least of the lanes.
 PADE_INLINE float least(V a) {
 #if defined(__AVX512F__)
-  a = min(a, __builtin_shuffle(a, I{8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7}));
-  a = min(a, __builtin_shuffle(a, I{4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11}));
-  a = min(a, __builtin_shuffle(a, I{2, 3, 0, 1, 6, 7, 4, 5, 10, 11, 8, 9, 14, 15, 12, 13}));
-  a = min(a, __builtin_shuffle(a, I{1, 0, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 15, 14}));
+  a = min(a, __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7));
+  a = min(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11));
+  a = min(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5, 10, 11, 8, 9, 14, 15, 12, 13));
+  a = min(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6, 9, 8, 11, 10, 13, 12, 15, 14));
 #elif defined(__AVX2__)
-  a = min(a, __builtin_shuffle(a, I{4, 5, 6, 7, 0, 1, 2, 3}));
-  a = min(a, __builtin_shuffle(a, I{2, 3, 0, 1, 6, 7, 4, 5}));
-  a = min(a, __builtin_shuffle(a, I{1, 0, 3, 2, 5, 4, 7, 6}));
+  a = min(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3));
+  a = min(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5));
+  a = min(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6));
 #else
   a = min(a, V{a[2], a[3], a[0], a[1]});
   a = min(a, V{a[1], a[0], a[3], a[2]});

@@ -60,7 +60,9 @@ Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, i
     truth.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), sequence.mask() == 0);
     std::vector<cv::Mat> components;
     cv::split(truth, components);
-    if (cv::countNonZero(components[0] == components[0]) == 0) continue;
+    cv::Mat known;
+    cv::compare(components[0], components[0], known, cv::CMP_EQ);
+    if (cv::countNonZero(known) == 0) continue;
     pairs.push_back({frame, grey(first->image), grey(second->image), std::move(truth)});
   }
   if (pairs.empty()) {

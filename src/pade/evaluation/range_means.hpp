@@ -19,10 +19,10 @@ struct RangeMeans {
   std::array<double, range_count> error{};          ///< sum of |Z - Z_true|, m
 
   /// Compares one depth image with the truth on the pixels (grid / 2 + i grid, grid / 2 + j grid).
-  /// @param truth      CV_32FC1, m; NaN, infinite or <= 0 = none. @param max_depth  m; estimates beyond are
-  /// none. @param where     only where this other depth image of the frame (of any window) has an estimate,
-  /// too.
-  void add(const DepthImage& estimate, const cv::Mat& truth, double max_depth, int grid,
+  /// @param true_depth  CV_32FC1, m; NaN, infinite or <= 0 = none.
+  /// @param max_depth   m; estimates beyond are none.
+  /// @param where       only where this other depth image of the frame (of any window) has an estimate, too.
+  void add(const DepthImage& estimate, const cv::Mat& true_depth, double max_depth, int grid,
            const DepthImage* where = nullptr);
 
   [[nodiscard]] double mean(std::size_t range) const;      ///< m; NaN where there is nothing

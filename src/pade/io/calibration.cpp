@@ -117,7 +117,7 @@ std::optional<Eigen::Vector3d> read_world_up(Fields& fields) {
   const Yaml* node = fields.find({"world_up"});
   if (node == nullptr) return std::nullopt;
   if (node->kind == Yaml::Kind::scalar) {
-    const auto axis = parse_direction(node->scalar);
+    auto axis = parse_direction(node->scalar);
     if (!axis) fields.wrong(*node, "world_up", kExpected);
     return axis;
   }

@@ -33,7 +33,7 @@ void put(std::string& bytes, const Value& value) {
 
 template <class Value>
 Value take(const char*& bytes) {
-  Value value;
+  Value value{};
   std::memcpy(&value, bytes, sizeof value);
   bytes += sizeof value;
   return value;

@@ -63,7 +63,7 @@ Result<Trajectory> choose_poses(const fs::path& mav, const std::string& choice, 
   if (path_exists(file)) {
     const auto T_body_vicon = read_mounting(mav / "vicon0" / "sensor.yaml");
     if (!T_body_vicon) return T_body_vicon.error();
-    const auto T_world_vicon = read_euroc_poses(file, report);
+    auto T_world_vicon = read_euroc_poses(file, report);
     if (!T_world_vicon) return T_world_vicon;
     return T_world_vicon->transformed(Pose{}, T_body_vicon->inverse());
   }

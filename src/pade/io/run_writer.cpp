@@ -66,9 +66,9 @@ Status RunWriter::add(const DepthImage& depth, const FlowField& flow) {
   return {};
 }
 
-void RunWriter::add_pose(Time time, const Pose& pose) {
-  const Eigen::Vector3d& p = pose.translation;
-  const Eigen::Quaterniond& q = pose.rotation;
+void RunWriter::add_pose(Time time, const Pose& T_world_camera) {
+  const Eigen::Vector3d& p = T_world_camera.translation;
+  const Eigen::Quaterniond& q = T_world_camera.rotation;
   trajectory_ += fmt::format("{} {:.6f} {:.6f} {:.6f} {:.8f} {:.8f} {:.8f} {:.8f}\n", to_string(time), p.x(),
                              p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
 }

@@ -60,7 +60,7 @@ class TrajectoryBuilder {
 
  private:
   struct Row {
-    std::size_t line;
+    std::size_t line = 0;
     StampedPose pose;
   };
   std::string file_;

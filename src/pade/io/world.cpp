@@ -24,7 +24,7 @@ std::optional<Eigen::Vector3d> parse_axis(std::string_view text) {
 }  // namespace
 
 std::optional<Eigen::Vector3d> parse_direction(std::string_view text) {
-  if (const auto axis = parse_axis(text)) return axis;
+  if (auto axis = parse_axis(text)) return axis;
   const auto fields = split_fields(text);
   if (fields.size() != 3) return std::nullopt;
   Eigen::Vector3d direction;

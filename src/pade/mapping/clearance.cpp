@@ -163,6 +163,8 @@ View Clearance::look_at(const Eigen::Vector3d& centre, double side, bool is_voxe
   const double per_near = 1 / z_near;
   const double per_far = 1 / z_far;
   constexpr double kRounding = 1e-9;
+  // Not negative after clamp: truncation rounds, in a fraction of the time of lround.
+  // NOLINTBEGIN(bugprone-incorrect-roundings)
   const auto first = [&](double x, double f, double c, int size) {
     x -= kRounding;
     return static_cast<int>(std::clamp(f * x * (x < 0 ? per_near : per_far) + c, 0.0, size - 1.0) + 0.5);
@@ -171,6 +173,7 @@ View Clearance::look_at(const Eigen::Vector3d& centre, double side, bool is_voxe
     x += kRounding;
     return static_cast<int>(std::clamp(f * x * (x < 0 ? per_far : per_near) + c, 0.0, size - 1.0) + 0.5);
   };
+  // NOLINTEND(bugprone-incorrect-roundings)
   const Camera& c = camera_;
   const Seen seen = over(
       first(centre.x() - half.x(), c.fx, c.cx, c.width), first(centre.y() - half.y(), c.fy, c.cy, c.height),

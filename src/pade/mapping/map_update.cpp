@@ -40,6 +40,7 @@ struct FreeSpaceSearch {
       out.push_back({code, depth, false});
       return;
     }
+    if (depth == kTreeDepth) return;  // a voxel has no parts
     for (std::uint64_t i = 0; i < 8; ++i) {
       visit(code | i << bits_below(depth + 1), centre + side * to_child[i], 0.5 * side, depth + 1);
     }

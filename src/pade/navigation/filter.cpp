@@ -79,7 +79,7 @@ FilterSnapshot Filter::snapshot() const {
 }
 
 void Filter::restore(const FilterSnapshot& snapshot) {
-  core_ = snapshot;
+  core_ = static_cast<const FilterCore&>(snapshot);
   clones_ = 0;
   P_ = snapshot.P;
 }

@@ -107,27 +107,37 @@ void Navigator::add(Measurement measurement, double latency, bool finite) {
   advance_live(newest_);
 }
 
-void Navigator::add(const GnssFix& m) {
-  add(Measurement(m), options_.gnss_position_latency, m.position.allFinite() && m.covariance.allFinite());
+void Navigator::add(const GnssFix& measurement) {
+  add(Measurement(measurement), options_.gnss_position_latency,
+      measurement.position.allFinite() && measurement.covariance.allFinite());
 }
-void Navigator::add(const GnssVelocity& m) {
-  add(Measurement(m), options_.gnss_velocity_latency, m.velocity.allFinite() && m.covariance.allFinite());
+void Navigator::add(const GnssVelocity& measurement) {
+  add(Measurement(measurement), options_.gnss_velocity_latency,
+      measurement.velocity.allFinite() && measurement.covariance.allFinite());
 }
-void Navigator::add(const BarometricHeight& m) {
-  add(Measurement(m), options_.barometer_latency, std::isfinite(m.height) && std::isfinite(m.sigma));
+void Navigator::add(const BarometricHeight& measurement) {
+  add(Measurement(measurement), options_.barometer_latency,
+      std::isfinite(measurement.height) && std::isfinite(measurement.sigma));
 }
-void Navigator::add(const Heading& m) {
-  add(Measurement(m), 0, std::isfinite(m.yaw) && std::isfinite(m.sigma));
+void Navigator::add(const Heading& measurement) {
+  add(Measurement(measurement), 0, std::isfinite(measurement.yaw) && std::isfinite(measurement.sigma));
 }
-void Navigator::add(const MagneticField& m) {
-  add(Measurement(m), options_.magnetometer_latency, m.field.allFinite() && std::isfinite(m.sigma));
+void Navigator::add(const MagneticField& measurement) {
+  add(Measurement(measurement), options_.magnetometer_latency,
+      measurement.field.allFinite() && std::isfinite(measurement.sigma));
 }
-void Navigator::add(const ZeroVelocity& m) { add(Measurement(m), 0, std::isfinite(m.sigma)); }
-void Navigator::add(const RangeToGround& m) {
-  add(Measurement(m), 0, std::isfinite(m.range) && std::isfinite(m.sigma) && std::isfinite(m.ground_height));
+void Navigator::add(const ZeroVelocity& measurement) {
+  add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
+}
+void Navigator::add(const RangeToGround& measurement) {
+  add(Measurement(measurement), 0,
+      std::isfinite(measurement.range) && std::isfinite(measurement.sigma) &&
+          std::isfinite(measurement.ground_height));
 }
 
-void Navigator::add(const RoadMotion& m) { add(Measurement(m), 0, std::isfinite(m.sigma)); }
+void Navigator::add(const RoadMotion& measurement) {
+  add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
+}
 
 void Navigator::retire(Time before) {
   while (!timeline_.measurements.empty() && timeline_.measurements.front().time < before) {

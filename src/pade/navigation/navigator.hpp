@@ -111,14 +111,14 @@ class Navigator {
   // Each stamped at the moment of measurement (less the sensor's latency), in any order. Refused data is
   // counted.
   void add(const ImuSample& sample);
-  void add(const GnssFix& fix);
-  void add(const GnssVelocity& velocity);
-  void add(const BarometricHeight& height);
-  void add(const Heading& heading);
-  void add(const MagneticField& field);
-  void add(const ZeroVelocity& stop);
-  void add(const RangeToGround& range);
-  void add(const RoadMotion& road);
+  void add(const GnssFix& measurement);
+  void add(const GnssVelocity& measurement);
+  void add(const BarometricHeight& measurement);
+  void add(const Heading& measurement);
+  void add(const MagneticField& measurement);
+  void add(const ZeroVelocity& measurement);
+  void add(const RangeToGround& measurement);
+  void add(const RoadMotion& measurement);
 
   /// Motion of the camera from image time t1 to image time t2 (t2 >= t1), from a clone at t1 within a replay
   /// that ends at t2: nothing stamped after t2 is used, however late the question comes.

@@ -169,7 +169,7 @@ ResultTable answers_by_sequence(const Results& results) {
   const std::array methods = {ttc, pade_literal, pade_exact};
   for (const std::string_view method : methods) {
     table.columns.push_back(shown_name(method) + ", ADE m");
-    table.columns.push_back("coverage");
+    table.columns.emplace_back("coverage");
   }
   for (const std::string& sequence : results.sequences) {
     std::vector<std::string> row = {sequence};

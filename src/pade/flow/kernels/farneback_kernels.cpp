@@ -38,7 +38,7 @@ void farneback_expand(PlaneView image, const ExpansionView& expansion, const Exp
   float* m1 = m0 + spacing;
   float* m2 = m1 + spacing;
   for (int y = first; y < last; ++y) {
-    const float* rows[2 * kMaxRadius + 1];
+    const float* rows[2 * kMaxRadius + 1] = {};
     for (int i = -radius; i <= radius; ++i) rows[i + radius] = image.row(clamp_index(y + i, image.height));
     for (int x = 0; x < n; x += kLanes) {
       const V middle = load(rows[radius] + x);

@@ -6,7 +6,23 @@
 
 namespace pade::flow::PADE_ISA {
 
-using namespace simd::PADE_ISA;  // NOLINT(google-build-using-namespace): the vocabulary of every kernel
+using simd::PADE_ISA::abs;
+using simd::PADE_ISA::all;
+using simd::PADE_ISA::clamp;
+using simd::PADE_ISA::gather;
+using simd::PADE_ISA::I;
+using simd::PADE_ISA::kLanes;
+using simd::PADE_ISA::load;
+using simd::PADE_ISA::max;
+using simd::PADE_ISA::min;
+using simd::PADE_ISA::ramp;
+using simd::PADE_ISA::select;
+using simd::PADE_ISA::set;
+using simd::PADE_ISA::sqrt;
+using simd::PADE_ISA::store;
+using simd::PADE_ISA::to_float;
+using simd::PADE_ISA::truncate;
+using simd::PADE_ISA::V;
 
 static_assert(kRowMultiple % (2 * kLanes) == 0);
 
