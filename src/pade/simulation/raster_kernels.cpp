@@ -219,7 +219,7 @@ PADE_INLINE void draw(const Triangle& t, const RasterView& view, const RasterTil
                       int y0, int y1) {
   constexpr int kFew = 6;  // blocks in a row: fewer are faster looked at than chosen
   for (int by = y0; by <= y1; ++by) {
-    Row row;
+    Row row{};
     for (int part = 0; part < kParts; ++part) {
       const V y = load(view.y_of_lanes + (tile.top + by) * raster_lanes + part * kLanes);
       for (int i = 0; i < 4; ++i) row.at[part][i] = t.y[i] * y + t.one[i];
@@ -253,14 +253,14 @@ void raster_triangles(const RasterView& view, const TrianglePacket* packets, std
   float origin[3];
   for (int i = 0; i < 9; ++i) r[i] = static_cast<float>(view.rotation[i]);
   for (int i = 0; i < 3; ++i) origin[i] = static_cast<float>(view.origin[i]);
-  Setup s;
+  Setup s{};
   for (std::uint32_t part = first * kParts; part < last * kParts; ++part) {
     const std::uint32_t packet = part / kParts;
     const int first_lane = static_cast<int>(part % kParts) * kLanes;
     set_up(view, r, origin, packets[packet], first_lane, tile, s);
     for (unsigned left = s.drawn; left != 0; left &= left - 1) {
       const int lane = __builtin_ctz(left);
-      Triangle t;
+      Triangle t{};
       for (int i = 0; i < 4; ++i) {
         t.x[i] = s.function[i][0][lane];
         t.y[i] = s.function[i][1][lane];
