@@ -224,8 +224,7 @@ std::string complaint(const Shape& shape) {
 
 Result<Geometry> Geometry::from(const World& world) {
   Geometry geometry;
-  for (std::size_t i = 0; i < world.visuals.size(); ++i) {
-    const Visual& visual = world.visuals[i];
+  for (const Visual& visual : world.visuals) {
     if (const std::string found = complaint(visual.shape); !found.empty()) {
       return Error{fmt::format("visual '{}': found {}, expected positive numbers", visual.name, found)};
     }

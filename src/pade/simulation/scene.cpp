@@ -129,7 +129,7 @@ double plausible(double exact, double about) {
 }
 
 RTCIntersectContext coherent_context() {
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   return context;
@@ -247,7 +247,7 @@ template <class RayHits, class Intersect>
 void Scene::Implementation::intersect(const RayPacket& rays, std::size_t first, const Intersect& with,
                                       HitPacket& hits) const {
   RTCIntersectContext context = coherent_context();
-  RayHits packet;
+  RayHits packet;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled at once, and hot
   constexpr std::size_t kLanes = std::extent_v<decltype(packet.ray.org_x)>;
   fill(packet.ray, rays, first, kSeen);
   std::fill_n(packet.hit.geomID, kLanes, RTC_INVALID_GEOMETRY_ID);
@@ -346,7 +346,10 @@ VectorPacket::Lanes Scene::exact_distances(const HitPacket& hits, const Eigen::V
         offset = facet->offset - facet->normal.dot(origin);
         before = primitive;
       }
-      const double exact = offset / facet->normal.dot(direction);
+      // met
+      // The first triangle differs from `before`, which is none.
+      const double exact =
+          offset / facet->normal.dot(direction);  // NOLINT(clang-analyzer-core.CallAndMessage)
       distances[i] = plausible(exact, about);
     }
   }

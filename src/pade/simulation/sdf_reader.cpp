@@ -58,11 +58,11 @@ class Reader {
  private:
   Status add_model(const sdf::Model& model, const Pose& T_world_parent, const std::string& prefix);
   Status add_link(const sdf::Link& link, const Pose& T_world_model, const std::string& prefix);
-  Status add_visual(const sdf::Visual& visual, const Pose& T_world_link, const std::string& prefix);
+  Status add_visual(const sdf::Visual& source, const Pose& T_world_link, const std::string& prefix);
   Status add_mesh(const sdf::Mesh& mesh, Visual visual, bool has_material);
   Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_link, const std::string& prefix);
   void add_light(const sdf::Light& light);
-  Result<Material> material_of(const sdf::Material& material) const;
+  Result<Material> material_of(const sdf::Material& source) const;
   Status read_pattern(const sdf::ElementPtr& element, Material& material) const;
   [[nodiscard]] fs::path folder_of(const std::string& named_file) const {
     return named_file.empty() || named_file.front() == '<' ? file_.parent_path()

@@ -22,7 +22,7 @@ struct SequenceOptions {
   bool save_flow =
       false;  ///< flow_next/, flow_previous/ (.flo) and visible_next/, visible_previous/ (PNG, 255 = seen)
   io::Overwrite overwrite = io::Overwrite::refuse;
-  bool keep_finished = false;  ///< where `out` holds this very sequence already, that is success
+  bool keep_finished = false;  ///< where `target` holds this very sequence already, that is success
 };
 
 /// Called after each frame with the numbers of finished frames and of all frames.
@@ -36,12 +36,12 @@ struct FlightCamera {
 };
 FlightCamera flight_camera(const Flight& flight, const World& world);
 
-/// Renders `flight` through `scene` into the folder `out`. Until it is complete everything lies in a hidden
-/// folder beside it; each file appears there whole or not at all, so that the work of a killed run is taken
-/// up by the next one and the result has the same bytes. Refuses an existing `out` (unless told to replace
-/// it), waypoints that the limits forbid, a path too short for the frames, a camera inside a solid, and
-/// output that cannot be written.
-Status write_sequence(const Scene& scene, const Flight& flight, const std::filesystem::path& out,
+/// Renders `flight` through `scene` into the folder `target`. Until it is complete everything lies in a
+/// hidden folder beside it; each file appears there whole or not at all, so that the work of a killed run is
+/// taken up by the next one and the result has the same bytes. Refuses an existing `target` (unless told to
+/// replace it), waypoints that the limits forbid, a path too short for the frames, a camera inside a solid,
+/// and output that cannot be written.
+Status write_sequence(const Scene& scene, const Flight& flight, const std::filesystem::path& target,
                       const SequenceOptions& options, const FrameProgress& progress = {});
 
 /// Sequence folders are known by this file, which says how they were made.

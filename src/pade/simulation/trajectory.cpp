@@ -294,9 +294,9 @@ KinematicState Trajectory::at(double time) const {
 
 Status Trajectory::check_limits() const {
   struct Check {
-    const char* name;
-    const char* unit;
-    double limit;
+    const char* name = "";
+    const char* unit = "";
+    double limit = 0;
     double scale = 1;
     double worst = 0;
     double when = 0;
