@@ -346,7 +346,6 @@ VectorPacket::Lanes Scene::exact_distances(const HitPacket& hits, const Eigen::V
         offset = facet->offset - facet->normal.dot(origin);
         before = primitive;
       }
-      // met
       // The first triangle differs from `before`, which is none.
       const double exact =
           offset / facet->normal.dot(direction);  // NOLINT(clang-analyzer-core.CallAndMessage)
