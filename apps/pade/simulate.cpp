@@ -194,7 +194,7 @@ void add_simulate(CLI::App& app, Context& context) {
   command->add_option("--set", arguments->set, "paper: the ten sequences, 1038 frames, of the experiments");
   command->add_flag("--quick", arguments->quick, "with --set: a tenth of the frames");
   command->add_option("--resource-path", arguments->resources, "folders with models, meshes and images");
-  command->add_option("--samples", arguments->samples, "rays per pixel")
+  command->add_option("--samples", arguments->samples, "samples per pixel")
       ->check(CLI::Range(1, 16))
       ->capture_default_str();
   command->add_flag("--preview", arguments->preview, "one ray per pixel, no ambient occlusion");

@@ -31,7 +31,7 @@ PADE_INLINE V dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y +
 
 /// Triangles of a vector ready to draw; `function` are the three edges and the inverse depth over (x, y).
 struct Setup {
-  enum { kEdges = 3, kInverseDepth = 3 };
+  static constexpr int kInverseDepth = 3;
   alignas(64) float function[4][3][kLanes];
   alignas(64) float nearest[kLanes];                               ///< largest inverse depth of a corner
   alignas(64) float farthest[kLanes];                              ///< smallest
@@ -51,10 +51,9 @@ PADE_INLINE void set_up(const RasterView& view, const float (&r)[9], const float
   }
   // Pixels that can be inside. A triangle that reaches behind the camera may be anywhere; so may one that
   // comes so near to its plane that rounding shows.
-  constexpr float kNear = 1e-4F;   // metres
-  constexpr float kSteep = 1e-3F;  // z per x and y
-  constexpr float kMargin =
-      0.25F;  // pixels; rounding takes a few parts in ten thousand of those of the image
+  constexpr float kNear = 1e-4F;    // metres
+  constexpr float kSteep = 1e-3F;   // z per x and y
+  constexpr float kMargin = 0.25F;  // pixels, some four times what rounding takes
   out.drawn = 0;
   const V nearest_z = min(p[0].z, min(p[1].z, p[2].z));
   const V farthest_z = max(p[0].z, max(p[1].z, p[2].z));

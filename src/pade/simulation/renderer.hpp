@@ -14,19 +14,19 @@
 namespace pade::simulation {
 
 struct RenderOptions {
-  int samples =
-      4;  ///< rays per pixel, 1 to 16; in pairs mirrored about the centre, so that their mean is the centre
+  /// Per pixel, 1 to 16; in pairs mirrored about the centre, so that their mean is the centre.
+  int samples = 4;
   bool shadows = true;
   bool ambient_occlusion = true;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("samples", self.samples, "rays per pixel, 1 to 16");
+    field("samples", self.samples, "samples per pixel, 1 to 16");
     field("shadows", self.shadows, "shadows of the sun");
     field("ambient_occlusion", self.ambient_occlusion, "corners that see less sky are darker");
   }
 
-  /// One ray per pixel and no ambient occlusion.
+  /// One sample per pixel and no ambient occlusion.
   static RenderOptions preview() { return {1, true, false}; }
 };
 
