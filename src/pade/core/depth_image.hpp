@@ -20,9 +20,10 @@ enum class DepthState : std::uint8_t {
   no_texture = 3,    ///< the image says nothing about the motion of this pixel
   inconsistent = 4,  ///< the flow contradicts the epipolar geometry: moving object, occlusion or mismatch
   out_of_view = 5,   ///< masked, outside the lens, or its match lies outside the other image
+  far = 6,           ///< textured and matched, and its `bound` lies beyond the range
 };
-inline constexpr std::array<std::string_view, 6> depth_state_names = {
-    "measured", "epipole", "low parallax", "no texture", "inconsistent", "out of view"};
+inline constexpr std::array<std::string_view, 7> depth_state_names = {
+    "measured", "epipole", "low parallax", "no texture", "inconsistent", "out of view", "far"};
 
 /// Z-depth on the pixel grid of the undistorted frame taken at `time`. With window n > 1 the images have
 /// ceil(height / n) x ceil(width / n) cells, and a cell stands for its n x n pixels.
@@ -32,6 +33,12 @@ struct DepthImage {
   cv::Mat depth;     ///< CV_32FC1, metres along the optical axis; NaN = no depth
   cv::Mat variance;  ///< CV_32FC1, m^2; NaN where there is no depth
   cv::Mat state;     ///< CV_8UC1 of DepthState; depth is NaN exactly where this is not `measured`
+  /// CV_32FC1, m^2: the part of `variance` that is the pixel's own (flow). The rest is common to the image:
+  /// baseline, rotation and direction of translation. NaN where there is no depth; empty = all is its own.
+  cv::Mat own_variance{};
+  /// CV_32FC1, m: nothing on the pixel's ray is nearer than this along the optical axis, whether or not it
+  /// has a depth. NaN = nothing is known; empty = depth less some sigmas, where there is depth.
+  cv::Mat bound{};
 
   [[nodiscard]] bool empty() const { return depth.empty(); }
 };

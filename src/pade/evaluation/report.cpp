@@ -83,7 +83,7 @@ Scales scales_of(const Report& report) {
   return {scales.depth, round_up_125(scales.sigma), scales.flow > 0 ? scales.flow : 1};
 }
 
-std::string state_items(const std::array<std::uint64_t, 6>* pixels) {
+std::string state_items(const std::array<std::uint64_t, depth_state_names.size()>* pixels) {
   const double total =
       pixels == nullptr
           ? 0

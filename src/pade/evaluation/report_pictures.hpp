@@ -14,8 +14,8 @@
 namespace pade::evaluation {
 
 /// Colours of DepthState in the order of its values, "#rrggbb" (Okabe and Ito 2008).
-inline constexpr std::array<std::string_view, 6> state_colours = {"#0072b2", "#e69f00", "#56b4e9",
-                                                                  "#bbbbbb", "#cc3311", "#333333"};
+inline constexpr std::array<std::string_view, depth_state_names.size()> state_colours = {
+    "#0072b2", "#e69f00", "#56b4e9", "#bbbbbb", "#cc3311", "#333333", "#009e73"};
 /// Pixels without a value in all pictures.
 inline constexpr std::string_view no_value_colour = "#a6a6a6";
 

@@ -33,7 +33,7 @@ Json json_of(const RunHealth& health) {
           {"warnings", health.warnings}};
 }
 
-Json json_of_states(const std::array<std::uint64_t, 6>& pixels) {
+Json json_of_states(const std::array<std::uint64_t, depth_state_names.size()>& pixels) {
   const double total = static_cast<double>(std::accumulate(pixels.begin(), pixels.end(), std::uint64_t{0}));
   Json states = Json::array();
   for (std::size_t i = 0; i < pixels.size(); ++i) {

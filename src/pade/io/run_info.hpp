@@ -49,10 +49,11 @@ struct RunInfo {
   std::optional<MapSummary> map;
 
   // Filled by RunWriter.
-  double depth_scale = 0;                          ///< counts per metre of depth/<time>.png
-  double sigma_scale = 0;                          ///< counts per metre of sigma/<time>.png
-  std::vector<std::string> stacks;                 ///< of depth, sigma, state, flow: those that were saved
-  std::array<std::uint64_t, 6> state_pixels = {};  ///< pixels (cells) of each DepthState over the run
+  double depth_scale = 0;           ///< counts per metre of depth/<time>.png
+  double sigma_scale = 0;           ///< counts per metre of sigma/<time>.png
+  std::vector<std::string> stacks;  ///< of depth, sigma, state, flow: those that were saved
+  std::array<std::uint64_t, depth_state_names.size()> state_pixels =
+      {};  ///< pixels (cells) of each DepthState over the run
 };
 
 /// Wall time of one stage over a run, milliseconds per frame.

@@ -68,7 +68,7 @@ class RunWriter {
   RunWriterOptions options_;
   double scale_ = 0;  // counts per metre
   std::string trajectory_ = "# timestamp tx ty tz qx qy qz qw   (camera to world, metres)\n";
-  std::array<std::uint64_t, 6> state_pixels_ = {};
+  std::array<std::uint64_t, depth_state_names.size()> state_pixels_ = {};
 };
 
 }  // namespace pade::io
