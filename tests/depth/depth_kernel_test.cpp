@@ -22,7 +22,8 @@ struct Row {
 };
 
 struct Output {
-  std::vector<float> depth = std::vector<float>(kCount), variance = std::vector<float>(kCount);
+  std::vector<float> depth = std::vector<float>(kCount), variance = std::vector<float>(kCount),
+                     own_variance = std::vector<float>(kCount), bound = std::vector<float>(kCount);
   std::vector<std::uint8_t> state = std::vector<std::uint8_t>(kCount);
 };
 
@@ -57,6 +58,7 @@ KernelParameters random_parameters(Random& random) {
   for (int i = 0; i < 3; ++i) k.omega[i] = static_cast<float>(w[i]);
   k.add_tz = k.tz;
   k.sigma2 = 0.09F;
+  k.sigma_scale2 = 1;
   k.parallax2 = 9;
   k.residual2 = 25;
   k.tangent2 = 0.06F;
@@ -101,8 +103,10 @@ double twin_depth(const KernelParameters& k, const Row& row, std::size_t i) {
 using Kernel = decltype(&baseline::depth_row);
 Output run(Kernel kernel, const KernelParameters& k, const Row& row, bool with_sigma) {
   Output out;
-  kernel(k, row.x.data(), row.y, row.flow.data(), with_sigma ? row.sigma.data() : nullptr, row.gate.data(),
-         kCount, out.depth.data(), out.variance.data(), out.state.data());
+  kernel(
+      k, row.x.data(), row.y, row.flow.data(), with_sigma ? row.sigma.data() : nullptr, row.gate.data(),
+      kCount,
+      {out.depth.data(), out.variance.data(), out.own_variance.data(), out.bound.data(), out.state.data()});
   return out;
 }
 

@@ -25,7 +25,8 @@ constexpr double kLeastForwardShare = 0.05;  // of the translation; less is not 
 static_assert(static_cast<int>(DepthState::epipole) == 1 && static_cast<int>(DepthState::low_parallax) == 2 &&
               static_cast<int>(DepthState::no_texture) == 3 &&
               static_cast<int>(DepthState::inconsistent) == 4 &&
-              static_cast<int>(DepthState::out_of_view) == 5);  // the kernel's constants
+              static_cast<int>(DepthState::out_of_view) == 5 &&
+              static_cast<int>(DepthState::far) == 6);  // the kernel's constants
 
 constexpr auto kOutOfView = static_cast<std::uint8_t>(DepthState::out_of_view);
 
@@ -63,12 +64,14 @@ KernelParameters kernel_parameters(const DepthInput& input, const DepthOptions& 
   k.fx_tx = static_cast<float>(camera.fx * t.x());
   k.fy_ty = static_cast<float>(camera.fy * t.y());
   k.tz = static_cast<float>(t.z());
-  copy_turn(input.motion.R_reference_other, k.turn);
-  copy_turn(input.motion.R_reference_other.transpose(), k.view);
+  copy_turn(input.R_left(), k.turn);
+  copy_turn(input.R_removed().transpose(), k.view);
   const Eigen::Vector3d omega = input.motion.rotation_vector();
   for (int i = 0; i < 3; ++i) k.omega[i] = static_cast<float>(omega[i]);
   k.add_tz = options.model == Model::exact ? k.tz : 0.0F;
   k.sigma2 = static_cast<float>(sigma * sigma);
+  k.sigma_scale2 = static_cast<float>(options.flow_sigma_scale * options.flow_sigma_scale);
+  k.relative2 = static_cast<float>(options.flow_relative_sigma * options.flow_relative_sigma);
   const bool gates = options.gates == Gates::on;
   k.parallax2 = gates ? static_cast<float>(options.parallax_gate * options.parallax_gate) : 0.0F;
   k.residual2 = gates ? static_cast<float>(options.residual_gate * options.residual_gate)
@@ -94,15 +97,16 @@ KernelParameters kernel_parameters(const DepthInput& input, const DepthOptions& 
   }
   k.has_pose = !input.motion.covariance.isZero(0);
   k.samelson = options.reading == Reading::samelson;
-  k.derotation = input.derotation == Derotation::image ? KernelDerotation::none
-                 : options.model == Model::exact       ? KernelDerotation::exact
-                                                       : KernelDerotation::first_order;
+  k.bound_k = static_cast<float>(options.bound_sigmas);
+  k.derotation = input.derotation == Derotation::image
+                     ? (input.rotation_removed ? KernelDerotation::remaining : KernelDerotation::none)
+                 : options.model == Model::exact ? KernelDerotation::exact
+                                                 : KernelDerotation::first_order;
   return k;
 }
 
 /// A measured pixel whose match falls on a pixel that the other frame does not see is out of view.
-void hide_invalid_matches(const DepthInput& input, const KernelParameters& k, int n, const FlowField& flow,
-                          DepthImage& out) {
+void hide_invalid_matches(const DepthInput& input, int n, const FlowField& flow, DepthImage& out) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (int r = 0; r < out.depth.rows; ++r) {
     auto* state = out.state.ptr<std::uint8_t>(r);
@@ -111,10 +115,10 @@ void hide_invalid_matches(const DepthInput& input, const KernelParameters& k, in
       const auto& w = flow.vectors.at<cv::Vec2f>(r, c);
       double u = cell_centre(c, n) + static_cast<double>(w[0]);
       double v = cell_centre(r, n) + static_cast<double>(w[1]);
-      if (k.derotation == KernelDerotation::none) {
+      if (input.derotation == Derotation::image) {
         const Eigen::Vector3d ray((u - input.camera.cx) / input.camera.fx,
                                   (v - input.camera.cy) / input.camera.fy, 1);
-        const Eigen::Vector3d seen = input.motion.R_reference_other.transpose() * ray;
+        const Eigen::Vector3d seen = input.R_removed().transpose() * ray;
         u = input.camera.fx * seen.x() / seen.z() + input.camera.cx;
         v = input.camera.fy * seen.y() / seen.z() + input.camera.cy;
       }
@@ -124,6 +128,8 @@ void hide_invalid_matches(const DepthInput& input, const KernelParameters& k, in
       state[c] = kOutOfView;
       out.depth.at<float>(r, c) = nan;
       out.variance.at<float>(r, c) = nan;
+      out.own_variance.at<float>(r, c) = nan;
+      out.bound.at<float>(r, c) = nan;
     }
   }
 }
@@ -220,7 +226,9 @@ std::vector<FlowSample> DepthEstimator::sample(const DepthInput& input, double w
   const cv::Mat& vectors = cells ? averaged_.vectors : input.flow.vectors;
   const cv::Mat& gate = cells ? cell_gate_ : gate_;
   const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(vectors.total()) / wanted)));
-  const Derotator derotate(input.camera, input.motion, options_.model, input.derotation);
+  const Derotator derotate = input.rotation_removed && input.derotation == Derotation::image
+                                 ? Derotator(input.camera, input.R_left())
+                                 : Derotator(input.camera, input.motion, options_.model, input.derotation);
   std::vector<FlowSample> samples;
   samples.reserve(vectors.total() / static_cast<std::size_t>(step * step) + 1);
   for (int r = step / 2; r < vectors.rows; r += step) {
@@ -273,6 +281,8 @@ void DepthEstimator::estimate(const DepthInput& input, DepthImage& out) {
   out.window = n;
   out.depth.create(flow.vectors.size(), CV_32FC1);
   out.variance.create(flow.vectors.size(), CV_32FC1);
+  out.own_variance.create(flow.vectors.size(), CV_32FC1);
+  out.bound.create(flow.vectors.size(), CV_32FC1);
   out.state.create(flow.vectors.size(), CV_8UC1);
   columns_.resize(static_cast<std::size_t>(flow.vectors.cols));
   for (int c = 0; c < flow.vectors.cols; ++c) {
@@ -282,10 +292,11 @@ void DepthEstimator::estimate(const DepthInput& input, DepthImage& out) {
   for (int r = 0; r < flow.vectors.rows; ++r) {
     depth_row(k, columns_.data(), static_cast<float>(cell_centre(r, n) - input.camera.cy),
               flow.vectors.ptr<float>(r), flow.sigma.empty() ? nullptr : flow.sigma.ptr<float>(r),
-              gate.ptr<std::uint8_t>(r), columns_.size(), out.depth.ptr<float>(r), out.variance.ptr<float>(r),
-              out.state.ptr<std::uint8_t>(r));
+              gate.ptr<std::uint8_t>(r), columns_.size(),
+              {out.depth.ptr<float>(r), out.variance.ptr<float>(r), out.own_variance.ptr<float>(r),
+               out.bound.ptr<float>(r), out.state.ptr<std::uint8_t>(r)});
   }
-  if (!input.valid.empty()) hide_invalid_matches(input, k, n, flow, out);
+  if (!input.valid.empty()) hide_invalid_matches(input, n, flow, out);
 }
 
 }  // namespace pade::depth

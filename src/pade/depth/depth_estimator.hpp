@@ -26,6 +26,17 @@ struct DepthInput {
   cv::Mat reference{};                       ///< CV_8UC1, the image on whose pixels the depth lives
   cv::Mat other{};                           ///< CV_8UC1, the other image as it was matched
   cv::Mat valid{};  ///< CV_8UC1, 0 where no frame sees anything (lens, airframe); empty = all valid
+  /// The rotation (other to reference) that was removed from the image before matching, where it is not
+  /// motion.R_reference_other: the motion was refined since.
+  std::optional<Eigen::Matrix3d> rotation_removed{};
+
+  /// Directions: what the other image was turned by before matching.
+  [[nodiscard]] Eigen::Matrix3d R_removed() const {
+    if (derotation == Derotation::flow) return Eigen::Matrix3d::Identity();
+    return rotation_removed.value_or(motion.R_reference_other);
+  }
+  /// Directions: the rotation that is still in the flow.
+  [[nodiscard]] Eigen::Matrix3d R_left() const { return motion.R_reference_other * R_removed().transpose(); }
 };
 
 /// What was found out about the pair as a whole.

@@ -17,6 +17,11 @@ constexpr std::int32_t kLowParallax = 2;
 constexpr std::int32_t kNoTexture = 3;
 constexpr std::int32_t kInconsistent = 4;
 constexpr std::int32_t kOutOfView = 5;
+constexpr std::int32_t kFar = 6;
+
+// Where |a| is not this many sigmas of itself, its direction is not known either: flow in any direction may
+// be parallax.
+constexpr float kDirectionSigmas2 = 36.0F;
 
 struct Vector2 {
   float x, y;
@@ -36,9 +41,17 @@ struct Vector2 {
   return {(k.fx * ex - px * ez) * inverse, (k.fy * ey - py * ez) * inverse};
 }
 
-/// J Sigma J^T of the depth: J = [s a^T(-A)/|a|^2 + (0,0,1), s^2 a^T B(x2) / |a|^2].
-[[gnu::always_inline]] inline float pose_variance(const KernelParameters& k, float x, float y, Vector2 at,
-                                                  float ax, float ay, float inverse_aa, float s, bool has_z) {
+/// What the covariance Sigma of the motion does to a pixel.
+struct PoseEffect {
+  float depth;     ///< J Sigma J^T of the depth, m^2
+  float parallax;  ///< of D along a, through the rotation, px^2
+  float reach;     ///< of |a|, in the direction in which it is greatest, px^2 m^2
+};
+
+/// J = [s a^T(-A)/|a|^2 + (0,0,1), s^2 a^T B(x2) / |a|^2].
+[[gnu::always_inline]] inline PoseEffect pose_effect(const KernelParameters& k, float x, float y, Vector2 at,
+                                                     float ax, float ay, float inverse_aa, float s,
+                                                     bool has_z) {
   const float g = s * inverse_aa;
   const float h = s * g;
   const float x2 = x + at.x;
@@ -53,22 +66,36 @@ struct Vector2 {
                       -h * (bx * (-u * v) + by * (-1.0F - v * v)),
                       -h * (bx * (1.0F + u * u) + by * (u * v)),
                       -h * (bx * -v + by * u)};
-  float sum = 0;
+  const float b[3] = {bx * (-u * v) + by * (-1.0F - v * v), bx * (1.0F + u * u) + by * (u * v),
+                      bx * -v + by * u};
+  PoseEffect effect{0, 0, 0};
   int index = 0;
 #pragma GCC unroll 6
   for (int r = 0; r < 6; ++r) {
 #pragma GCC unroll 6
-    for (int c = r; c < 6; ++c) sum += (r == c ? 1.0F : 2.0F) * k.pose[index++] * j[r] * j[c];
+    for (int c = r; c < 6; ++c) {
+      const float covariance = (r == c ? 1.0F : 2.0F) * k.pose[index++];
+      effect.depth += covariance * j[r] * j[c];
+      if (r >= 3) effect.parallax += covariance * b[r - 3] * b[c - 3];
+    }
   }
-  return sum;
+  effect.parallax *= inverse_aa;
+  // The trace of A Sigma_t A^T, no less than its greatest eigenvalue.
+  effect.reach = k.fx * k.fx * k.pose[0] + k.fy * k.fy * k.pose[6] - 2.0F * k.fx * x * k.pose[2] -
+                 2.0F * k.fy * y * k.pose[7] + (x * x + y * y) * k.pose[11];
+  return effect;
 }
 
 template <KernelDerotation kDerotation, bool kSamelson, bool kSigma, bool kPose>
 void row(const KernelParameters& parameters, const float* __restrict x_of, const float y,
          const float* __restrict flow, const float* __restrict sigma, const std::uint8_t* __restrict gate,
-         std::size_t count, float* __restrict depth, float* __restrict variance,
-         std::uint8_t* __restrict state) {
+         std::size_t count, const DepthRow& out) {
   const KernelParameters k = parameters;  // a copy that no store through the outputs can change
+  float* __restrict const depth = out.depth;
+  float* __restrict const variance = out.variance;
+  float* __restrict const own_variance = out.own_variance;
+  float* __restrict const bounds = out.bound;
+  std::uint8_t* __restrict const state = out.state;
   const float nan = __builtin_nanf("");
   for (std::size_t i = 0; i < count; ++i) {
     const float x = x_of[i];
@@ -86,6 +113,11 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
     } else if constexpr (kDerotation == KernelDerotation::exact) {
       const Vector2 shift = turned_shift(k.turn, k, match.x, match.y);
       d = {wx + shift.x, wy + shift.y};
+    } else if constexpr (kDerotation == KernelDerotation::remaining) {
+      const Vector2 left = turned_shift(k.turn, k, match.x, match.y);
+      d = {wx + left.x, wy + left.y};
+      const Vector2 shift = turned_shift(k.view, k, match.x, match.y);
+      match = {match.x + shift.x, match.y + shift.y};
     } else {
       const float u = x * k.inverse_fx;
       const float v = y * k.inverse_fy;
@@ -96,9 +128,10 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
     const float aa = ax * ax + ay * ay;
     const float ad = ax * d.x + ay * d.y;
     const float across = ax * d.y - ay * d.x;
-    const float s = kSamelson ? ad / (d.x * d.x + d.y * d.y) : aa / ad;
+    const float d2 = d.x * d.x + d.y * d.y;
+    const float s = kSamelson ? ad / d2 : aa / ad;
     const float z = s + k.add_tz;
-    const float sigma2 = kSigma ? sigma[i] * sigma[i] : k.sigma2;
+    const float sigma2 = (kSigma ? k.sigma_scale2 * sigma[i] * sigma[i] : k.sigma2) + k.relative2 * d2;
 
     const float ad2 = ad * ad;
     const float noise = sigma2 * aa;
@@ -128,19 +161,38 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
     // e2 = (sigma / parallax)^2 (docs/method.md; held to the integral by a test).
     const float e2 = noise / ad2;
     const float second_order = 1.0F + e2 * (18.0F + 400.0F * e2);
-    float spread = s * s * (s * s * sigma2 * second_order + k.axis_variance) * inverse_aa;
+    const float spread = s * s * (s * s * sigma2 * second_order + k.axis_variance) * inverse_aa;
+    PoseEffect pose{0, 0, k.axis_variance};
     if constexpr (kPose) {
-      spread += pose_variance(k, x, y, d, ax, ay, inverse_aa, s, k.add_tz != 0.0F);
+      pose = pose_effect(k, x, y, d, ax, ay, inverse_aa, s, k.add_tz != 0.0F);
+      pose.reach += k.axis_variance;
     }
+
+    // The lower bound: the least |a| over the greatest parallax that are still likely.
+    const float reach = __builtin_sqrtf(aa);
+    const bool directed = aa >= kDirectionSigmas2 * pose.reach;
+    const float along = ad / reach;
+    const float seen = directed ? (along > 0.0F ? along : 0.0F) : __builtin_sqrtf(d2);
+    const float least = reach - k.bound_k * __builtin_sqrtf(pose.reach);
+    const float most = seen + k.bound_k * __builtin_sqrtf(sigma2 + pose.parallax);
+    const float nothing_before = least / most + k.add_tz;
+    const bool behind = directed & (ad < 0.0F) & parallax;
+    const bool bounded = (gate[i] == 0) & inside & (across_ok | !directed) & !behind & (sigma2 < 1e6F) &
+                         (least > 0.0F) & (nothing_before > 0.0F);
+    const float bound = bounded ? nothing_before : nan;
+    why = (why == kLowParallax) & (bound >= k.range) ? kFar : why;
+
     depth[i] = why == kMeasured ? z : nan;
-    variance[i] = why == kMeasured ? spread : nan;
+    own_variance[i] = why == kMeasured ? spread : nan;
+    variance[i] = why == kMeasured ? spread + pose.depth : nan;
+    bounds[i] = bound;
     state[i] = static_cast<std::uint8_t>(why);
   }
 }
 
 template <KernelDerotation kDerotation, bool kSamelson, class... Rest>
 void choose(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
-            Rest... rest) {
+            const Rest&... rest) {
   if (sigma != nullptr) {
     k.has_pose ? row<kDerotation, kSamelson, true, true>(k, x, y, flow, sigma, rest...)
                : row<kDerotation, kSamelson, true, false>(k, x, y, flow, sigma, rest...);
@@ -163,25 +215,23 @@ void sum_whole_windows(const float* __restrict in, std::size_t windows, int n, f
 }
 
 template <KernelDerotation kDerotation, class... Rest>
-void choose_reading(const KernelParameters& k, Rest... rest) {
+void choose_reading(const KernelParameters& k, const Rest&... rest) {
   k.samelson ? choose<kDerotation, true>(k, rest...) : choose<kDerotation, false>(k, rest...);
 }
 
 }  // namespace
 
 void depth_row(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
-               const std::uint8_t* gate, std::size_t count, float* depth, float* variance,
-               std::uint8_t* state) {
+               const std::uint8_t* gate, std::size_t count, const DepthRow& out) {
   switch (k.derotation) {
     case KernelDerotation::none:
-      return choose_reading<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, depth, variance,
-                                                    state);
+      return choose_reading<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, out);
     case KernelDerotation::exact:
-      return choose_reading<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, depth, variance,
-                                                     state);
+      return choose_reading<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, out);
     case KernelDerotation::first_order:
-      return choose_reading<KernelDerotation::first_order>(k, x, y, flow, sigma, gate, count, depth, variance,
-                                                           state);
+      return choose_reading<KernelDerotation::first_order>(k, x, y, flow, sigma, gate, count, out);
+    case KernelDerotation::remaining:
+      return choose_reading<KernelDerotation::remaining>(k, x, y, flow, sigma, gate, count, out);
   }
 }
 

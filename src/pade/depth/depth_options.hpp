@@ -45,6 +45,8 @@ struct DepthOptions {
   Gates gates = Gates::on;
   double range = 20;
   double flow_sigma = 0;
+  double flow_sigma_scale = 1;
+  double flow_relative_sigma = 0;
   double nearest = 1;
   double far = 10;
   double parallax_gate = 3;
@@ -52,6 +54,7 @@ struct DepthOptions {
   double residual_angle = 0.25;
   double texture_gate = 3;
   double texture_correlation = 0.5;
+  double bound_sigmas = 3;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -63,6 +66,10 @@ struct DepthOptions {
     field("range", self.range, "farthest depth that is published, m");
     field("flow_sigma", self.flow_sigma,
           "standard deviation of each flow component, px; 0 = from the flow across the epipolar lines");
+    field("flow_sigma_scale", self.flow_sigma_scale,
+          "what the standard deviations that the flow brings along are multiplied by");
+    field("flow_relative_sigma", self.flow_relative_sigma,
+          "further standard deviation of the flow, as share of the derotated flow");
     field("nearest", self.nearest,
           "nearest depth of interest, m: where even this has no parallax is the epipole");
     field("parallax_gate", self.parallax_gate, "parallax below this many flow sigmas is low parallax");
@@ -77,8 +84,17 @@ struct DepthOptions {
           "is");
     field("texture_correlation", self.texture_correlation,
           "weaker gradient is texture where those of the matched images correlate at least this much");
+    field("bound_sigmas", self.bound_sigmas, "k: sigmas that the lower bound keeps from what was measured");
   }
 };
+
+/// What the chain uses: sigma as calibrated on flow of clg-fast (docs/method.md, "Variance").
+inline DepthOptions chain_options() {
+  DepthOptions options;
+  options.flow_sigma_scale = 1.3;
+  options.flow_relative_sigma = 0.01;
+  return options;
+}
 
 }  // namespace pade::depth
 

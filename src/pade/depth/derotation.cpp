@@ -28,6 +28,9 @@ Derotator::Derotator(const Camera& camera, const RelativeMotion& motion, Model m
             : model == Model::exact         ? Kind::exact
                                             : Kind::first_order) {}
 
+Derotator::Derotator(const Camera& camera, const Eigen::Matrix3d& R_left)
+    : camera_(camera), rotation_(R_left), omega_(rotation_log(R_left)), kind_(Kind::exact) {}
+
 Eigen::Vector2d Derotator::operator()(const Eigen::Vector2d& p, const Eigen::Vector2d& w) const {
   switch (kind_) {
     case Kind::none:

@@ -22,6 +22,8 @@ class Derotator {
  public:
   /// @param derotation  image: the flow is already derotated and passes through.
   Derotator(const Camera& camera, const RelativeMotion& motion, Model model, Derotation derotation);
+  /// Exact, by the rotation that is left in the flow.
+  Derotator(const Camera& camera, const Eigen::Matrix3d& R_left);
 
   /// @param p  Pixel of the reference relative to the principal point. @param w  Flow from the reference to
   /// the other image, px. @return D = f b'_xy / b'_z - p with b' = R (p + w)/f (exact; NaN where b'_z <= 0),

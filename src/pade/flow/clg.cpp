@@ -12,6 +12,8 @@
 namespace pade::flow {
 namespace {
 
+constexpr int kWarpsOfGivenFlow = 2;
+
 // Everything that one pyramid level needs, kept between frames.
 struct LevelMemory {
   Plane mean, difference;
@@ -49,7 +51,10 @@ class Clg final : public PyramidFlow {
     LevelMemory& memory = levels_[static_cast<std::size_t>(index)];
     memory.resize(flow.u.width(), flow.u.height());
     const bool finest = index == finest_level();
-    const int warps = finest ? options_.warps : options_.coarse_warps;
+    // A flow that was given and taken up on a fine level is near its end already.
+    const int coarse_warps =
+        started_fine() ? std::min(options_.coarse_warps, kWarpsOfGivenFlow) : options_.coarse_warps;
+    const int warps = finest ? options_.warps : coarse_warps;
     for (int warp = 0; warp < warps; ++warp) {
       ClgLevel level = view(memory, image(from, index), image(to, index), flow);
       level.mask = mask(index);

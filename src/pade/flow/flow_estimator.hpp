@@ -34,6 +34,7 @@ struct FlowOptions {
   int smallest_level = 8;
   bool half_resolution = false;
   FlowConfidence confidence = FlowConfidence::none;
+  int initial_level = 16;
   int threads = 1;
 
   template <class Self, class Visitor>
@@ -44,6 +45,10 @@ struct FlowOptions {
           "stop at half the size and interpolate: about a quarter of the time, blunter edges");
     field("confidence", self.confidence,
           "source of the standard deviations: none, local or forward_backward");
+    field("initial_level", self.initial_level,
+          "coarsest pyramid level at which a given initial flow is taken up, 0 = full size: a good one, "
+          "taken up "
+          "on a fine level, finds thin things that move farther than they are wide");
     field("threads", self.threads, "threads for one pair; the result does not depend on it");
   }
 };

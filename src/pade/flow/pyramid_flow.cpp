@@ -85,8 +85,11 @@ FlowField PyramidFlow::run(int from, int to, const cv::Mat& initial) {
 }
 
 void PyramidFlow::coarse_to_fine(int from, int to, const cv::Mat& initial) {
-  for (int level = count_ - 1; level >= finest_level(); --level) {
-    start(level, initial);
+  const bool given =
+      initial.size() == cv::Size(image(0, 0).width, image(0, 0).height) && initial.type() == CV_32FC2;
+  coarsest_ = given ? std::clamp(options_.initial_level, finest_level(), count_ - 1) : count_ - 1;
+  for (int level = coarsest_; level >= finest_level(); --level) {
+    start(level, given ? initial : cv::Mat());
     refine(level, from, to, flow_);
   }
   if (finest_level() > 0) start(0, initial);
@@ -147,12 +150,13 @@ PlaneView PyramidFlow::mask(int level) const {
   return masked_ ? mask_levels_[static_cast<std::size_t>(level)].view() : PlaneView{};
 }
 
-// The flow with which a level begins: the given one on the coarsest, else that of the coarser level.
+// The flow with which a level begins: the given one on the coarsest that is used, else that of the coarser
+// level.
 void PyramidFlow::start(int level, const cv::Mat& initial) {
   const PlaneView& size = image(0, level);
-  if (level == count_ - 1) {
+  if (level == coarsest_) {
     flow_.resize(size.width, size.height);
-    if (initial.size() == cv::Size(image(0, 0).width, image(0, 0).height) && initial.type() == CV_32FC2) {
+    if (!initial.empty()) {
       load_flow(initial, level, flow_);
     } else {
       flow_.u.fill(0);

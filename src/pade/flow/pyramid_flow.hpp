@@ -39,6 +39,7 @@ class PyramidFlow : public FlowEstimator {
   /// 0 where a pixel of the first image has no weight; data null where all have.
   [[nodiscard]] PlaneView mask(int level) const;
   [[nodiscard]] int level_count() const { return count_; }
+  [[nodiscard]] bool started_fine() const { return coarsest_ < count_ - 1; }
   [[nodiscard]] int finest_level() const { return options_.half_resolution && count_ > 1 ? 1 : 0; }
   [[nodiscard]] simd::InstructionSet isa() const { return isa_; }
 
@@ -65,6 +66,7 @@ class PyramidFlow : public FlowEstimator {
   std::vector<AlignedFloats> scratch_;
   std::array<Pyramid, 2> pyramids_;
   int count_ = 1;
+  int coarsest_ = 0;  // level on which the search begins
   int newest_ = 0;
   cv::Size stream_size_;
   int stream_type_ = -1;

@@ -81,8 +81,6 @@ class Run {
       return sequence_.check(undecodable_.size());
     }
     const Frame& frame = *loaded.frame;
-    writer_.add_pose(frame.time, frame.T_world_camera);
-    path_.push_back(frame.T_world_camera.translation);
     truths_[frame.time] = std::move(loaded.truth);
     while (truths_.size() > step() + 1) truths_.erase(truths_.begin());
 
@@ -93,6 +91,8 @@ class Run {
       return sequence_.check(undecodable_.size());
     }
     ++used_;
+    writer_.add_pose(frame.time, mapper_.T_world_camera());
+    path_.push_back(mapper_.T_world_camera().translation);
     return update.outcome == MapperUpdate::Outcome::mapped ? take(update, frame.image) : Status();
   }
 

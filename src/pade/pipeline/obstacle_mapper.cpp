@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pade/depth/derotation.hpp"
+#include "pade/depth/pair_fusion.hpp"
+#include "pade/depth/prediction.hpp"
 
 namespace pade {
 namespace {
@@ -63,25 +65,45 @@ Status check(const Camera& camera, const ObstacleMapperOptions& options, const c
   return {};
 }
 
-/// The motion with its covariance. Over several frames the error is that of a velocity: it grows with their
-/// number.
-RelativeMotion motion_between(const Frame& reference, const Frame& other, int step) {
-  const bool newest_is_reference = reference.time > other.time;
-  const Frame& older = newest_is_reference ? other : reference;
-  const Frame& newer = newest_is_reference ? reference : other;
-  RelativeMotion motion = relative_motion(reference.T_world_camera, other.T_world_camera,
-                                          seconds_between(reference.time, other.time));
-  if (newer.motion_covariance.isZero(0)) return motion;
-  RelativeMotion forward =
-      relative_motion(older.T_world_camera, newer.T_world_camera, seconds_between(older.time, newer.time));
-  forward.covariance = step * step * newer.motion_covariance;
-  motion.covariance = newest_is_reference ? reversed(forward).covariance : forward.covariance;
-  return motion;
+/// The motion that the poses as given tell, with its covariance. Over several frames the error is that of a
+/// velocity: it grows with their number.
+/// @param older, newer  poses. @param covariance  of the last of the `step` motions, older frame as reference
+RelativeMotion motion_between(const Pose& older, const Pose& newer, double duration,
+                              const Matrix6d& covariance, int step, Order order) {
+  RelativeMotion forward = relative_motion(older, newer, duration);
+  forward.covariance = step * step * covariance;
+  return order == Order::newest ? reversed(forward) : forward;
+}
+
+/// Covariance of a motion over `n` refined ones: what the images have measured is new in each, the length of
+/// the baseline is not.
+Matrix6d over_several(const RelativeMotion& one, int n) {
+  Matrix6d sum = n * one.covariance;
+  const double length = one.t_reference_other.norm();
+  if (!(length > 0)) return sum;
+  const Eigen::Vector3d along = one.t_reference_other / length;
+  const double variance = along.dot(one.covariance.topLeftCorner<3, 3>() * along);
+  sum.topLeftCorner<3, 3>() += (n * n - n) * variance * along * along.transpose();
+  return sum;
+}
+
+/// Flow over the longer baseline starts near its end: there it is taken up at half size.
+flow::FlowOptions flow_options(bool given_start) {
+  flow::FlowOptions options;
+  options.confidence = flow::FlowConfidence::local;
+  if (given_start) options.initial_level = 1;
+  return options;
 }
 
 }  // namespace
 
 ObstacleMapperOptions as_printed(ObstacleMapperOptions options) {
+  options.flow = "dis-medium";
+  options.longest_step = 1;
+  options.refinement.on = false;
+  options.edges.radius = 0;
+  options.depth.flow_sigma_scale = 1;
+  options.depth.flow_relative_sigma = 0;
   options.depth.model = depth::Model::instantaneous;
   options.depth.reading = depth::Reading::samelson;
   options.derotation = depth::Derotation::flow;
@@ -93,23 +115,31 @@ ObstacleMapperOptions as_printed(ObstacleMapperOptions options) {
 Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const ObstacleMapperOptions& options,
                                               const cv::Mat& valid) {
   if (const Status status = check(camera, options, valid); !status) return status.error();
-  auto flow = flow::make_flow_estimator(options.flow);
+  const bool two = options.longest_step > options.step;
+  auto flow = flow::make_flow_estimator(options.flow, flow_options(two));
   if (!flow) return flow.error();
+  auto first_flow = flow::make_flow_estimator(options.first_flow, flow_options(false));
+  if (!first_flow) return first_flow.error();
   auto map = mapping::OccupancyMap::create(options.map);
   if (!map) return map.error();
-  return ObstacleMapper(camera, options, valid, std::move(flow).value(), std::move(map).value());
+  return ObstacleMapper(camera, options, valid, std::move(flow).value(), std::move(first_flow).value(),
+                        std::move(map).value());
 }
 
 ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options,
                                const cv::Mat& valid, std::unique_ptr<flow::FlowEstimator> flow,
-                               mapping::OccupancyMap map)
+                               std::unique_ptr<flow::FlowEstimator> first_flow, mapping::OccupancyMap map)
     : camera_(camera),
       options_(options),
       valid_(valid.clone()),
       flow_(std::move(flow)),
+      first_flow_(std::move(first_flow)),
+      refiner_(options.refinement),
       depth_(options.depth),
       map_(std::move(map)) {
   if (!valid_.empty() && cv::countNonZero(valid_ == 0) == 0) valid_.release();
+  flow_->set_mask(valid_);
+  first_flow_->set_mask(valid_);
 }
 
 std::string ObstacleMapper::reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const {
@@ -121,9 +151,9 @@ std::string ObstacleMapper::reason_to_skip(const cv::Mat& image, Time time, cons
   if (!pose.is_finite() || std::abs(pose.rotation.norm() - 1) > 1e-3) {
     return "the pose is not finite or its quaternion is not of unit norm";
   }
-  if (!recent_.empty() && time <= recent_.back().time) {
+  if (!recent_.empty() && time <= recent_.back().frame.time) {
     return "time " + to_string(time) + " is not after that of the frame before, " +
-           to_string(recent_.back().time);
+           to_string(recent_.back().frame.time);
   }
   return {};
 }
@@ -140,55 +170,158 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     return update_;
   }
 
-  Frame newest{time, {}, T_world_camera, motion_covariance};
+  Tracked newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera};
   {
     const Stopwatch watch(update_, Stage::grey);
-    newest.image = to_grey(image);
+    newest.frame.image = to_grey(image);
   }
   update_.outcome = MapperUpdate::Outcome::waiting;
-  if (recent_.size() == static_cast<std::size_t>(options_.step)) {
-    const Frame older = std::move(recent_.front());
-    recent_.pop_front();
-    options_.order == Order::newest ? map_pair(newest, older) : map_pair(older, newest);
+  if (recent_.size() >= static_cast<std::size_t>(options_.step)) {
+    map_frame(newest);
     update_.outcome = MapperUpdate::Outcome::mapped;
     ++health_.mapped;
   }
   recent_.push_back(std::move(newest));
+  const int kept = two_baselines() ? options_.longest_step : options_.step;
+  if (recent_.size() > static_cast<std::size_t>(kept)) recent_.pop_front();
   return update_;
 }
 
-/// Figures 1 and 2 of the paper, for one pair of frames.
-void ObstacleMapper::map_pair(const Frame& reference, const Frame& other) {
-  // Compute relative translation and rotation (Section 2.2).
-  update_.motion = motion_between(reference, other, options_.step);
+/// The paper's order and its derotation of the flow know one pair only.
+bool ObstacleMapper::two_baselines() const {
+  return options_.longest_step > options_.step && options_.order == Order::newest &&
+         options_.derotation == depth::Derotation::image;
+}
 
-  // Remove the rotation, so that flow is parallax alone.
-  cv::Mat seen = other.image;
-  if (options_.derotation == depth::Derotation::image) {
-    const Stopwatch watch(update_, Stage::derotate);
-    seen = depth::derotate_image(other.image, camera_, update_.motion);
-  }
+const ObstacleMapper::Tracked& ObstacleMapper::before(int frames) const {
+  return recent_[recent_.size() - static_cast<std::size_t>(frames)];
+}
 
-  // Calculate optical flow (Section 2.1).
-  {
-    const Stopwatch watch(update_, Stage::flow);
-    update_.flow = flow_->estimate(reference.image, seen);
-  }
+/// Figures 1 and 2 of the paper, for one frame and those before it.
+void ObstacleMapper::map_frame(Tracked& newest) {
+  const Tracked& older = before(options_.step);
+  const bool newest_is_reference = options_.order == Order::newest;
+  const Frame& reference = newest_is_reference ? newest.frame : older.frame;
+  const bool two = two_baselines();
+
+  // Relative translation and rotation (Section 2.2), optical flow (Section 2.1), and what the images say of
+  // the motion.
+  const RelativeMotion prior =
+      motion_between(older.given, newest.given, seconds_between(older.frame.time, newest.frame.time),
+                     newest.frame.motion_covariance, options_.step, options_.order);
+  Pair pair = match(reference, newest_is_reference ? older.frame : newest.frame, prior,
+                    two ? *first_flow_ : *flow_, {});
+  refine(pair, reference);
+  place(newest, older);
 
   // Average optical flow and calculate the depth image (Section 2.3).
-  {
+  estimate_depth(pair, reference, prior.R_reference_other, update_.depth);
+  update_.step = options_.step;
+  if (two) {
+    const int step = longer_step(newest.frame, pair);
+    const Frame& other = before(step).frame;
+    RelativeMotion motion = relative_motion(newest.frame.T_world_camera, other.T_world_camera,
+                                            seconds_between(newest.frame.time, other.time));
+    motion.covariance = over_several(pair.motion, (step + options_.step - 1) / options_.step);
+    cv::Mat start;
+    {
+      const Stopwatch watch(update_, Stage::flow);
+      start = depth::predict_flow(pair.flow.vectors, camera_, pair.motion, motion);
+    }
+    std::swap(first_depth_, update_.depth);
+    pair = match(reference, other, motion, *flow_, start);
+    estimate_depth(pair, reference, {}, update_.depth);
     const Stopwatch watch(update_, Stage::depth);
-    depth_.estimate(
-        {camera_, update_.motion, update_.flow, options_.derotation, reference.image, seen, valid_},
-        update_.depth);
-    update_.depth.time = reference.time;
-    update_.diagnostics = depth_.diagnostics();
+    depth::fuse_pairs(first_depth_, update_.depth);
+    update_.step = step;
   }
+  if (options_.depth.gates == depth::Gates::on) {
+    const Stopwatch watch(update_, Stage::depth);
+    depth::guard_edges(update_.depth, options_.edges);
+  }
+  update_.depth.time = reference.time;
   update_.reference = reference;
+  update_.motion = pair.motion;
+  update_.flow = pair.flow;
 
   // Back-project and update the occupancy map (Section 4.2).
   const Stopwatch watch(update_, Stage::map);
   update_.change = map_.integrate(update_.depth, camera_, reference.T_world_camera);
+}
+
+/// Removes the rotation, so that flow is parallax alone, and calculates it.
+ObstacleMapper::Pair ObstacleMapper::match(const Frame& reference, const Frame& other,
+                                           const RelativeMotion& motion, flow::FlowEstimator& method,
+                                           const cv::Mat& initial) {
+  Pair pair{motion, other.image, {}};
+  if (options_.derotation == depth::Derotation::image) {
+    const Stopwatch watch(update_, Stage::derotate);
+    pair.seen = depth::derotate_image(other.image, camera_, motion);
+  }
+  const Stopwatch watch(update_, Stage::flow);
+  pair.flow = method.estimate(reference.image, pair.seen, initial);
+  return pair;
+}
+
+void ObstacleMapper::refine(Pair& pair, const Frame& reference) {
+  const Stopwatch watch(update_, Stage::refine);
+  const bool image = options_.derotation == depth::Derotation::image;
+  cv::Mat unseen;
+  if (!valid_.empty()) unseen = valid_ == 0;
+  update_.refinement =
+      refiner_.refine({camera_, pair.motion, pair.flow,
+                       image ? pair.motion.R_reference_other : Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
+                       reference.image, unseen});
+  pair.motion = update_.refinement.motion;
+}
+
+/// Hangs the newest frame on the older one by the refined motion.
+void ObstacleMapper::place(Tracked& newest, const Tracked& older) const {
+  const bool refined = update_.refinement.outcome == depth::RefinementOutcome::refined;
+  newest.corrected = refined || older.corrected;
+  if (!newest.corrected) return;
+  const RelativeMotion& motion = update_.refinement.motion;
+  const Pose T_reference_other{Eigen::Quaterniond(motion.R_reference_other).normalized(),
+                               motion.t_reference_other};
+  newest.frame.T_world_camera =
+      older.frame.T_world_camera *
+      (options_.order == Order::newest ? T_reference_other.inverse() : T_reference_other);
+  newest.frame.T_world_camera.rotation.normalize();
+}
+
+/// The longest baseline over which most of the image stays where a start from the first flow finds it.
+int ObstacleMapper::longer_step(const Frame& newest, const Pair& first) const {
+  constexpr int kGrid = 16;
+  std::vector<double> parallax;
+  for (int v = kGrid / 2; v < camera_.height; v += kGrid) {
+    for (int u = kGrid / 2; u < camera_.width; u += kGrid) {
+      const auto& w = first.flow.vectors.at<cv::Vec2f>(v, u);
+      const double length = std::hypot(w[0], w[1]);
+      if (std::isfinite(length)) parallax.push_back(length);
+    }
+  }
+  if (parallax.empty()) return options_.step;
+  const auto most = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() * 4 / 5);
+  std::nth_element(parallax.begin(), most, parallax.end());
+  const double baseline = first.motion.t_reference_other.norm();
+  const int available = std::min(options_.longest_step, static_cast<int>(recent_.size()));
+  for (int step = available; step > options_.step; --step) {
+    const Pose& T_world_other = before(step).frame.T_world_camera;
+    const double longer = (T_world_other.translation - newest.T_world_camera.translation).norm();
+    if (*most * longer <= options_.largest_parallax * baseline) return step;
+  }
+  return options_.step;
+}
+
+void ObstacleMapper::estimate_depth(const Pair& pair, const Frame& reference,
+                                    const std::optional<Eigen::Matrix3d>& removed, DepthImage& out) {
+  const Stopwatch watch(update_, Stage::depth);
+  depth::DepthInput input{camera_,         pair.motion, pair.flow, options_.derotation,
+                          reference.image, pair.seen,   valid_};
+  const bool refined = update_.refinement.outcome == depth::RefinementOutcome::refined;
+  if (refined && removed) input.rotation_removed = *removed;
+  depth_.estimate(input, out);
+  update_.diagnostics = depth_.diagnostics();
 }
 
 }  // namespace pade

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,8 @@
 #include "pade/core/result.hpp"
 #include "pade/depth/depth_estimator.hpp"
 #include "pade/depth/depth_options.hpp"
+#include "pade/depth/edges.hpp"
+#include "pade/depth/motion_refinement.hpp"
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 
@@ -32,19 +35,32 @@ enum class Order {
 };
 
 struct ObstacleMapperOptions {
-  std::string flow = "dis-medium";
+  std::string flow = "clg-fast";
+  std::string first_flow = "clg-fast-half";
   depth::Derotation derotation = depth::Derotation::image;
   Order order = Order::newest;
   int step = 1;
-  depth::DepthOptions depth;
+  int longest_step = 4;
+  double largest_parallax = 40;
+  depth::MotionRefinementOptions refinement;
+  depth::DepthOptions depth = depth::chain_options();
+  depth::EdgeOptions edges;
   mapping::MapOptions map;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("flow", self.flow, "optical-flow method");
+    field("first_flow", self.first_flow,
+          "method for the first pair of two; its flow refines the motion and starts that of the second");
     field("derotate", self.derotation, "image | flow: where rotation is removed");
     field("order", self.order, "newest | first: the frame of a pair on whose pixels the depth lives");
     field("step", self.step, "pairs each frame with the step-th before it");
+    field("longest_step", self.longest_step,
+          "then with one up to this many frames before it, for precision; up to step = one pair only");
+    field("largest_parallax", self.largest_parallax,
+          "the longest baseline is one over which four fifths of the image move less, px");
+    field("refinement", self.refinement, "motion refined by the images");
+    field("edges", self.edges, "depth at edges");
     field("depth", self.depth, "depth from motion");
     field("map", self.map, "occupancy map");
   }
@@ -55,8 +71,8 @@ struct ObstacleMapperOptions {
 ObstacleMapperOptions as_printed(ObstacleMapperOptions options = {});
 
 /// The stages of one frame, in order. `total` is the latency from add() to its return.
-enum class Stage { grey, derotate, flow, depth, map, total };
-inline constexpr std::array<std::string_view, 6> stage_names = {"grey",  "derotate", "flow",
+enum class Stage { grey, derotate, flow, refine, depth, map, total };
+inline constexpr std::array<std::string_view, 7> stage_names = {"grey",  "derotate", "flow", "refine",
                                                                 "depth", "map",      "total"};
 
 /// What one call of ObstacleMapper::add() did.
@@ -68,9 +84,11 @@ struct MapperUpdate {
   };
   Outcome outcome = Outcome::waiting;
   std::string reason;
-  Frame reference;        ///< the frame of the depth image, grey
-  RelativeMotion motion;  ///< the other camera of the pair seen from the reference
-  FlowField flow;         ///< from the reference to the other image (derotated where derotate = image)
+  Frame reference;        ///< the frame of the depth image, grey; its pose is the refined one
+  RelativeMotion motion;  ///< the other camera of the (last) pair seen from the reference, refined
+  FlowField flow;  ///< of that pair, from the reference to the other image (derotated where derotate = image)
+  int step = 0;    ///< frames between the two
+  depth::RefinedMotion refinement;  ///< of the motion over `step` of the options, and how it was found
   DepthImage depth;
   depth::DepthDiagnostics diagnostics;
   mapping::MapChange change;                         ///< what the depth image changed in the map
@@ -99,8 +117,13 @@ class ObstacleMapper {
   /// @param image  CV_8UC1 or CV_8UC3 (BGR), undistorted; copied. @param T_world_camera  pose at `time`.
   /// @return what was done; valid until the next call.
   /// @param motion_covariance  of the motion from the frame before (Frame::motion_covariance); zero = exact.
+  /// Where it is not zero, rotation and direction of the motion are refined by the images, and the map is
+  /// built on the chain of refined motions: T_world_camera().
   const MapperUpdate& add(const cv::Mat& image, Time time, const Pose& T_world_camera,
                           const Matrix6d& motion_covariance = Matrix6d::Zero());
+
+  /// Pose of the newest frame that was taken, in the map's world: as given, corrected by the images.
+  [[nodiscard]] const Pose& T_world_camera() const { return recent_.back().frame.T_world_camera; }
 
   [[nodiscard]] const ObstacleMapperOptions& options() const { return options_; }
   [[nodiscard]] const Camera& camera() const { return camera_; }
@@ -108,18 +131,42 @@ class ObstacleMapper {
   [[nodiscard]] const mapping::OccupancyMap& map() const { return map_; }
 
  private:
+  /// A frame of the recent past, its pose refined.
+  struct Tracked {
+    Frame frame;
+    Pose given;              ///< T_world_camera as it came
+    bool corrected = false;  ///< frame.T_world_camera is another
+  };
+  /// What was matched of two frames.
+  struct Pair {
+    RelativeMotion motion;
+    cv::Mat seen;  ///< the other image as it was matched
+    FlowField flow;
+  };
   ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid,
-                 std::unique_ptr<flow::FlowEstimator> flow, mapping::OccupancyMap map);
+                 std::unique_ptr<flow::FlowEstimator> flow, std::unique_ptr<flow::FlowEstimator> first_flow,
+                 mapping::OccupancyMap map);
   [[nodiscard]] std::string reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const;
-  void map_pair(const Frame& reference, const Frame& other);
+  [[nodiscard]] bool two_baselines() const;
+  [[nodiscard]] const Tracked& before(int frames) const;
+  void map_frame(Tracked& newest);
+  Pair match(const Frame& reference, const Frame& other, const RelativeMotion& motion,
+             flow::FlowEstimator& method, const cv::Mat& initial);
+  void refine(Pair& pair, const Frame& reference);
+  void place(Tracked& newest, const Tracked& older) const;
+  [[nodiscard]] int longer_step(const Frame& newest, const Pair& first) const;
+  void estimate_depth(const Pair& pair, const Frame& reference, const std::optional<Eigen::Matrix3d>& removed,
+                      DepthImage& out);
 
   Camera camera_;
   ObstacleMapperOptions options_;
   cv::Mat valid_;
-  std::unique_ptr<flow::FlowEstimator> flow_;
+  std::unique_ptr<flow::FlowEstimator> flow_, first_flow_;
+  depth::MotionRefiner refiner_;
   depth::DepthEstimator depth_;
   mapping::OccupancyMap map_;
-  std::deque<Frame> recent_;  // the last step frames, grey, oldest first
+  std::deque<Tracked> recent_;  // grey, oldest first
+  DepthImage first_depth_;      // of the shorter baseline
   MapperUpdate update_;
   MapperHealth health_;
 };
