@@ -1,4 +1,4 @@
-// `pade evaluate`: how accurate the depth of one run or several was.
+// `pade evaluate`: how accurate the depth of one run or several was, or their maps.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -16,6 +16,7 @@
 #include "pade/io/sequence.hpp"
 
 #include "commands.hpp"
+#include "evaluate_map.hpp"
 
 namespace pade::cli {
 namespace {
@@ -29,6 +30,7 @@ struct Arguments {
   std::string csv;
   bool json = false;
   bool force = false;
+  EvaluateMapArguments map;
 };
 
 // The sequence as the run read it: calibration, mask and poses decide which frames there are and on which
@@ -85,7 +87,7 @@ std::string csv_of(const std::vector<std::string>& names, const std::vector<Dept
   return csv;
 }
 
-Status evaluate(const Arguments& arguments) {
+Status evaluate_depth(const Arguments& arguments) {
   std::vector<std::string> names = arguments.runs;
   std::vector<DepthAccuracy> all;
   for (const std::string& run : arguments.runs) {
@@ -114,22 +116,58 @@ Status evaluate(const Arguments& arguments) {
   return {};
 }
 
+Status evaluate(const Arguments& arguments) {
+  if (arguments.map.world.empty()) return evaluate_depth(arguments);
+  EvaluateMapArguments map = arguments.map;
+  map.runs = arguments.runs;
+  map.sequence = arguments.sequence;
+  map.json = arguments.json;
+  return evaluate_maps(map);
+}
+
+void add_map_options(CLI::App& command, EvaluateMapArguments& map) {
+  auto* world = command.add_option(
+      "--world", map.world, "Compare the map with this SDF world, through which the sequence was flown");
+  command.add_option("--resource-path", map.resources, "Folders with models, meshes and images of the world")
+      ->needs(world);
+  command
+      .add_option_function<std::string>(
+          "--align", [&map](const std::string& name) { map.align = name == "rigid"; },
+          "rigid (default): lay the true poses on the run's first; none")
+      ->check(CLI::IsMember({"rigid", "none"}))
+      ->needs(world);
+  command
+      .add_flag("--replay", map.replay,
+                "Map the sequence again, and ask after each frame what is known ahead")
+      ->needs(world);
+  command
+      .add_option(
+          "--reference", map.reference,
+          "A run of the same flight with true poses: its occupied voxels, over the same frames, are 100 %")
+      ->needs(world);
+  command.add_flag("!--no-ceiling", map.ceiling, "Leave out OctoMap with exact depth, which takes longest")
+      ->needs(world);
+}
+
 }  // namespace
 
 void add_evaluate(CLI::App& app, Context& context) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("evaluate", "Say how accurate the depth of a run was.");
+  CLI::App* command = app.add_subcommand("evaluate", "Say how accurate the depth of a run was, or its map.");
   command->footer(
       "Errors are compared with the true depth of the sequence, in ranges of true depth. With the depth "
       "images at hand\n"
       "(pade map --save depth) they are computed anew, else printed as the run wrote them down.\n\n"
       "  pade evaluate out/flight                 a table\n"
-      "  pade evaluate out/* --csv accuracy.csv   several runs and their mean\n");
+      "  pade evaluate out/* --csv accuracy.csv   several runs and their mean\n"
+      "  pade evaluate out/flight --world W.sdf   the map against the world's geometry "
+      "(docs/map-evaluation.md)\n");
   command->add_option("RUN", arguments->runs, "Folder that pade map wrote; several are averaged")->required();
   command->add_option("--sequence", arguments->sequence, "Where the truth is, if the sequence has moved");
   command->add_option("--csv", arguments->csv, "Write the figures to this file as well");
   command->add_flag("--json", arguments->json, "Print JSON instead of a table");
   command->add_flag("--force", arguments->force, "Replace an existing CSV file");
+  add_map_options(*command, arguments->map);
   command->callback([arguments, &context] {
     io::watch_for_interrupts();
     const Status status = evaluate(*arguments);
