@@ -342,6 +342,7 @@ void print_run(const io::Run& run, const std::optional<evaluation::DepthAccuracy
          depth_state_names[i]);
   }
   for (const std::string& stack : info.stacks) line("images", "{}/", stack);
+  for (const Hint& hint : info.hints) line(to_name(hint.severity), "{} ({})", hint.message, hint.advice);
   for (const std::string& warning : info.health.warnings) line("warning", "{}", warning);
   for (const io::Skipped& item : info.health.skipped) line("skipped", "{}: {}", item.file, item.reason);
   print_timing(run.timing);

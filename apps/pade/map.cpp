@@ -8,6 +8,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pade/evaluation/accuracy_tables.hpp"
+#include "pade/evaluation/run_hints.hpp"
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
@@ -131,6 +132,7 @@ void print_table(const MapArguments& arguments, const MapResult& result) {
     fmt::print("{:14} {} occupied and {} free voxels of {} m\n", "Map", info.map->occupied_voxels,
                info.map->free_voxels, info.map->voxel);
   }
+  fmt::print("{}", evaluation::to_table(info.hints));
   if (!result.timing.stages.empty()) {
     const io::StageTiming& total = result.timing.stages.back();
     fmt::print(
@@ -199,7 +201,7 @@ void add_map(CLI::App& app, Context& context) {
       "report.html and, where the flight has true depth, evaluation.json and .csv.\n"
       "Examples:\n"
       "  pade map flight --out run\n"
-      "  pade map flight --out run --flow dis-fast --range 40 --save depth,sigma,state\n"
+      "  pade map flight --out run --flow dis-fast --range 40 --save depth,sigma,state,bound\n"
       "  pade map flight --out literal --paper");
   map->add_option("sequence", a->sequence, "folder of the recorded flight")->required();
   map->add_option("-o,--out", a->out, "folder of the run, made by this command")->required();
@@ -211,7 +213,7 @@ void add_map(CLI::App& app, Context& context) {
   add_enum(*map, "--imu", a->imu, "class of the IMU, for --poses from-imu-gnss (default industrial)");
   map->add_option("--calibration", a->calibration, "calibration file instead of the sequence's own");
   map->add_option("--world-up", a->world_up, "axis of the pose world that points up: +x -x +y -y +z -z");
-  map->add_option("--save", a->save, "image stacks to write: any of depth,sigma,state,flow");
+  map->add_option("--save", a->save, "image stacks to write: any of depth,sigma,state,bound,flow");
   map->add_option("--config", a->config, "YAML file with options as run.json echoes them");
   map->add_option("--threads", a->threads, "2 reads ahead; the result is the same")
       ->check(CLI::Range(1, 64))

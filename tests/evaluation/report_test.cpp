@@ -9,10 +9,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "pade/evaluation/report_map.hpp"
 #include "pade/evaluation/report_pictures.hpp"
 
+#include "evaluation/known_map.hpp"
 #include "evaluation/synthetic_depth.hpp"
 
 namespace pade::evaluation {
@@ -21,6 +23,12 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
+
+/// A free lane of 8 m along x, 3 m wide and high, with a wall at its end.
+const mapping::OccupancyMap& some_map() {
+  static const mapping::OccupancyMap map = test::free_lane(8);
+  return map;
+}
 
 Report some_report() {
   const cv::Size size(64, 48);
@@ -31,7 +39,9 @@ Report some_report() {
   report.info.camera.width = size.width;
   report.info.camera.height = size.height;
   report.info.range_limit = 20;
-  report.info.health = {3, 2, 1, {{"rgb/2.png", "found 0 bytes"}}, {}};
+  report.info.health = {3, 2, 1, 0, 0, {{"rgb/2.png", "found 0 bytes"}}, {}};
+  report.info.hints = {
+      {"large-mask", HintSeverity::warning, "61 % of the <image> is masked", "check mask.png"}};
   report.info.map = io::MapSummary{0.1, 3, 10};
   report.timing = {{io::summarise("flow", {10, 12}), io::summarise("total", {20, 22})}, 40, 1000000};
   const cv::Mat truth = test::truth_ramp(size);
@@ -42,8 +52,9 @@ Report some_report() {
   accumulator.add(frame.depth, truth);
   report.accuracy = accumulator.result();
   report.frames = {frame, frame};
-  report.occupied = {{0, 0, 0}, {1, 2, 0.5F}, {3, 1, 2}};
-  report.trajectory = {{0, 0, 1}, {1, 0, 1}};
+  report.frames[1].depth.bound = 0.8 * frame.depth.depth;
+  report.map = &some_map();
+  report.trajectory = {{0, 0, 0.05}, {1, 0, 0.05}, {2.06, 0, 0.05}};
   return report;
 }
 
@@ -60,7 +71,8 @@ TEST(Report, LoadsNothingFromOutside) {
   for (std::sregex_iterator it(html.begin(), html.end(), link), end; it != end; ++it, ++links) {
     EXPECT_THAT((*it)[1].str(), testing::StartsWith("data:image/")) << "outside the page";
   }
-  EXPECT_EQ(links, 1 + 2 * 6 + 3) << "the wheel, six pictures per frame, three views of the map";
+  EXPECT_EQ(links, 1 + 2 * 6 + 1 + 4 + 2)
+      << "the wheel, six pictures per frame, one bound, four views of the map, two ahead";
   EXPECT_THAT(html, AllOf(Not(HasSubstr("url(")), Not(HasSubstr("<script")), Not(HasSubstr("@import"))));
 }
 
@@ -83,6 +95,38 @@ TEST(Report, SaysWhatTheRunSays) {
   EXPECT_THAT(to_html(some_report()),
               AllOf(HasSubstr("pade 1.2.3"), HasSubstr("rgb/2.png"), HasSubstr("found 0 bytes"),
                     HasSubstr("depth.window"), HasSubstr("beyond 16 m")));
+}
+
+TEST(Report, SaysTheHintsBeforeAnythingElse) {
+  const std::string html = to_html(some_report());
+  const std::size_t hint = html.find("61 % of the &lt;image&gt; is masked");
+  ASSERT_NE(hint, std::string::npos);
+  EXPECT_LT(hint, html.find("<h2>"));
+  EXPECT_THAT(html, HasSubstr("check mask.png"));
+}
+
+TEST(Report, ShowsTheWayAheadWithItsReach) {
+  const std::string html = to_html(some_report());
+  EXPECT_THAT(html, AllOf(HasSubstr("The way ahead of the last pose"), HasSubstr("<b>5.6 m</b>"),
+                          HasSubstr(std::string(occupancy_colours[0])),
+                          HasSubstr(std::string(occupancy_colours[1]))));
+  Report hovering = some_report();
+  hovering.trajectory = {{2.35, 0, 0}, {2.36, 0, 0}};
+  hovering.look = {0, 0, 0};
+  EXPECT_THAT(to_html(hovering), Not(HasSubstr("The way ahead")));
+  hovering.look = {1, 0, 0};
+  EXPECT_THAT(to_html(hovering), HasSubstr("<b>5.3 m</b>"));
+}
+
+TEST(Report, DrawsFreeSpaceWhereNothingIsOccupied) {
+  auto tree = std::make_unique<octomap::OcTree>(0.1);
+  test::fill(*tree, {0, -1, -1}, {4, 1, 1}, false);
+  const auto map = std::move(mapping::OccupancyMap::create({}, std::move(tree))).value();
+  Report report = some_report();
+  report.map = &map;
+  report.info.map->occupied_voxels = 0;
+  EXPECT_THAT(to_html(report),
+              AllOf(HasSubstr("Nothing is occupied"), HasSubstr("at the height of the flight")));
 }
 
 TEST(Report, IsTheSameTwice) { EXPECT_EQ(to_html(some_report()), to_html(some_report())); }
@@ -139,6 +183,90 @@ TEST(ReportFrames, AreSpreadEvenly) {
   EXPECT_TRUE(evenly_spread(0, 4).empty());
 }
 
+/// The picture of a drawing.
+cv::Mat picture_of(const std::string& svg) {
+  const std::size_t at = svg.find("data:image/");
+  const std::string uri = svg.substr(at, svg.find('"', at) - at);
+  const std::string bytes = bytes_of_uri(uri);
+  return cv::imdecode(std::vector<unsigned char>(bytes.begin(), bytes.end()), cv::IMREAD_COLOR);
+}
+
+int pixels_of(const cv::Mat& picture, mapping::Occupancy state) {
+  const cv::Vec3b colour =
+      colourise_occupancy(cv::Mat(1, 1, CV_8UC1, cv::Scalar(static_cast<int>(state)))).at<cv::Vec3b>(0);
+  cv::Mat same;
+  cv::inRange(picture, colour, colour, same);
+  return cv::countNonZero(same);
+}
+
+TEST(MapViews, ShowFreeOccupiedAndUnknownWhereTheyAre) {
+  // The lane is 80 x 30 voxels free and the wall 2 x 30 voxels occupied, in every section along x.
+  const std::vector<Eigen::Vector3d> path = {{0, 0, 0.05}, {8.2, 0, 0.05}};
+  const MapScene scene{some_map(), path};
+  const MapViews views = draw_map(scene);
+  const cv::Mat level = picture_of(views.level);
+  EXPECT_EQ(pixels_of(level, mapping::Occupancy::free), 80 * 30);
+  EXPECT_EQ(pixels_of(level, mapping::Occupancy::occupied), 2 * 30);
+  EXPECT_EQ(pixels_of(level, mapping::Occupancy::unknown), static_cast<int>(level.total()) - 82 * 30);
+  const cv::Mat section = picture_of(views.section);
+  EXPECT_EQ(section.cols, 82);
+  EXPECT_EQ(pixels_of(section, mapping::Occupancy::free), 80 * 30);
+  EXPECT_EQ(pixels_of(section, mapping::Occupancy::occupied), 2 * 30);
+}
+
+TEST(MapViews, FollowTheHeightOfThePath) {
+  // Above the lane nothing is known.
+  const std::vector<Eigen::Vector3d> path = {{0, 0, 2.05}, {8.2, 0, 2.05}};
+  const cv::Mat level = picture_of(draw_map({some_map(), path}).level);
+  EXPECT_EQ(pixels_of(level, mapping::Occupancy::unknown), static_cast<int>(level.total()));
+}
+
+TEST(MapViews, ShowEveryVoxelOfAPrunedCube) {
+  auto tree = std::make_unique<octomap::OcTree>(0.1);
+  test::fill(*tree, {0.05, 0.05, 0.05}, {0.75, 0.75, 0.75}, true);
+  tree->updateInnerOccupancy();
+  tree->prune();
+  const auto map = std::move(mapping::OccupancyMap::create({}, std::move(tree))).value();
+  ASSERT_EQ(map.occupied().size(), 1U) << "one cube of 8 voxels to a side";
+  const std::vector<Eigen::Vector3d> path = {{0, 0, 0}, {0.5, 0, 0}};
+  const cv::Mat top = picture_of(draw_map({map, path}).top);
+  const cv::Vec3b none(0xa6, 0xa6, 0xa6);
+  cv::Mat empty;
+  cv::inRange(top, none, none, empty);
+  EXPECT_EQ(static_cast<int>(top.total()) - cv::countNonZero(empty), 64);
+}
+
+TEST(MapViews, TurnToTheWidthOfThePage) {
+  auto tree = std::make_unique<octomap::OcTree>(0.1);
+  test::fill(*tree, {0.05, 0.05, 0.05}, {0.95, 7.95, 0.95}, false);
+  test::fill(*tree, {0.05, 8.05, 0.05}, {0.05, 8.05, 0.05}, true);
+  test::fill(*tree, {0.95, 0.05, 0.05}, {0.95, 0.05, 0.95}, true);
+  const auto map = std::move(mapping::OccupancyMap::create({}, std::move(tree))).value();
+  const std::vector<Eigen::Vector3d> path = {{0.5, 0, 0.5}, {0.5, 8, 0.5}};
+  const MapViews views = draw_map({map, path, Eigen::Vector3d::UnitZ(), {0, 0, 0}, {1000, 500, true}});
+  EXPECT_TRUE(views.wide);
+  const cv::Mat level = picture_of(views.level);
+  EXPECT_GT(level.cols, 3 * level.rows);
+  // x points upward on the page and y to the left: seen from above, not from below.
+  EXPECT_EQ(pixels_of(level, mapping::Occupancy::free), 80 * 10 - 1);
+  EXPECT_EQ(pixels_of(level, mapping::Occupancy::occupied), 1);
+  const cv::Rect top_right(level.cols / 2, 0, level.cols - level.cols / 2, level.rows / 2);
+  EXPECT_EQ(pixels_of(level(top_right), mapping::Occupancy::occupied), 1)
+      << "the pole at the smallest y and the largest x";
+}
+
+TEST(Corridor, IsDrawnToScale) {
+  const std::vector<Eigen::Vector3d> path = {{0, 0, 0}, {2, 0, 0}};
+  const CorridorViews views = draw_corridor({some_map(), path});
+  EXPECT_NEAR(views.reach, 5.65, 0.03);
+  for (const std::string& view : {views.level, views.upright}) {
+    const cv::Mat picture = picture_of(view);
+    ASSERT_EQ(picture.size(), cv::Size(300, 120)) << "half voxels";
+    EXPECT_EQ(pixels_of(picture, mapping::Occupancy::free), 2 * 60 * 2 * 30);
+    EXPECT_EQ(pixels_of(picture, mapping::Occupancy::occupied), 2 * 2 * 2 * 30);
+  }
+}
+
 struct Up {
   const char* name;
   Eigen::Vector3d direction;
@@ -147,9 +275,12 @@ struct Up {
 class MapFromAbove : public testing::TestWithParam<Up> {};
 
 TEST_P(MapFromAbove, NamesTheHorizontalAxes) {
-  const std::vector<Eigen::Vector3f> occupied = {{0, 0, 0}, {1, 2, 3}};
+  auto tree = std::make_unique<octomap::OcTree>(0.1);
+  test::fill(*tree, {0, 0, 0}, {0, 0, 0}, true);
+  test::fill(*tree, {1, 2, 3}, {1, 2, 3}, true);
+  const auto map = std::move(mapping::OccupancyMap::create({}, std::move(tree))).value();
   const std::vector<Eigen::Vector3d> path = {{0, 0, 0}, {1, 1, 1}};
-  const MapViews views = draw_map({occupied, path, 0.1, GetParam().direction});
+  const MapViews views = draw_map({map, path, GetParam().direction});
   EXPECT_THAT(views.top, AllOf(HasSubstr(std::string(">") + GetParam().right + " [m]"),
                                HasSubstr(std::string(">") + GetParam().away + " [m]")));
 }

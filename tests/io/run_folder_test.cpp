@@ -35,13 +35,16 @@ DepthImage ramp(cv::Size size, int window, std::int64_t nanoseconds) {
                    window,
                    cv::Mat(rows, columns, CV_32FC1),
                    cv::Mat(rows, columns, CV_32FC1),
-                   cv::Mat(rows, columns, CV_8UC1)};
+                   cv::Mat(rows, columns, CV_8UC1),
+                   {},
+                   cv::Mat(rows, columns, CV_32FC1)};
   for (int y = 0; y < rows; ++y) {
     for (int x = 0; x < columns; ++x) {
       const bool hole = (x + y) % 5 == 0;
       const float depth = 0.5F + 0.013F * static_cast<float>(x + columns * y);
       image.depth.at<float>(y, x) = hole ? kNaN : depth;
       image.variance.at<float>(y, x) = hole ? kNaN : 0.01F * depth;
+      image.bound.at<float>(y, x) = (x + y) % 3 == 0 ? kNaN : 0.7F * depth;
       image.state.at<std::uint8_t>(y, x) = hole ? std::uint8_t{3} : std::uint8_t{0};
     }
   }
@@ -58,10 +61,14 @@ RunInfo some_info(cv::Size size) {
   info.camera.height = size.height;
   info.camera.fx = info.camera.fy = 21.5;
   info.window = 2;
-  info.health = {5, 4, 3, {{"rgb/3.png", "found 0 bytes"}}, {"world_up is a guess"}};
+  info.health = {5, 4, 3, 7, 8, {{"rgb/3.png", "found 0 bytes"}}, {"world_up is a guess"}};
   info.world_up = WorldUp{{0, -1, 0}, true, "camera.yaml"};
   info.origin = GeographicOrigin{48.1, 11.6, 519.0};
-  info.map = MapSummary{0.1, 123, 4567};
+  info.map = MapSummary{0.1, 123, 4567, 9000, 800, 70, 6, 5000};
+  info.motion = {3, 1, 0.25, 0.125, 1.5};
+  info.masked_share = 0.0625;
+  info.hints = {{"empty-map", HintSeverity::error, "the map is \"empty\"", "fly nearer"},
+                {"large-mask", HintSeverity::warning, "61 % is masked", "check mask.png"}};
   return info;
 }
 
@@ -84,7 +91,7 @@ TEST_P(RunFolder, GivesBackDepthWithinHalfACount) {
   const test::TemporaryFolder here;
   const cv::Size size(23, 17);
   const DepthImage written = ramp(size, GetParam(), 12'345'678'900);
-  const Status status = write_run(here / "run", size, "depth,sigma,state,flow", written);
+  const Status status = write_run(here / "run", size, "depth,sigma,state,bound,flow", written);
   ASSERT_TRUE(status.ok()) << status.error().message;
 
   const auto run = read_run(here / "run");
@@ -102,6 +109,12 @@ TEST_P(RunFolder, GivesBackDepthWithinHalfACount) {
       const float z = full.depth.at<float>(y, x);
       EXPECT_EQ(read->state.at<std::uint8_t>(y, x), full.state.at<std::uint8_t>(y, x));
       ASSERT_EQ(std::isnan(read->depth.at<float>(y, x)), std::isnan(z)) << x << ", " << y;
+      const float bound = full.bound.at<float>(y, x);
+      ASSERT_EQ(std::isnan(read->bound.at<float>(y, x)), std::isnan(bound)) << x << ", " << y;
+      if (!std::isnan(bound)) {
+        EXPECT_LE(read->bound.at<float>(y, x), bound) << "a bound is never rounded up";
+        EXPECT_GT(read->bound.at<float>(y, x), bound - 1.0001 / run->info.bound_scale);
+      }
       if (std::isnan(z)) continue;
       EXPECT_NEAR(read->depth.at<float>(y, x), z, half_count);
       EXPECT_NEAR(std::sqrt(read->variance.at<float>(y, x)), std::sqrt(full.variance.at<float>(y, x)),
@@ -117,7 +130,7 @@ TEST(RunFolderFiles, AreThoseThatWereAskedFor) {
   const test::TemporaryFolder here;
   const cv::Size size(8, 6);
   ASSERT_TRUE(write_run(here / "bare", size, "", ramp(size, 1, 0)).ok());
-  for (const char* stack : {"depth", "sigma", "state", "flow"})
+  for (const char* stack : {"depth", "sigma", "state", "bound", "flow"})
     EXPECT_FALSE(fs::exists(here / "bare" / stack));
   for (const char* file : {"run.json", "timing.json", "trajectory.txt"})
     EXPECT_TRUE(fs::exists(here / "bare" / file));
@@ -130,8 +143,8 @@ TEST(RunFolderFiles, AreThoseThatWereAskedFor) {
 TEST(RunFolderFiles, AreTheSameBytesTwiceButForTheTiming) {
   const test::TemporaryFolder here;
   const cv::Size size(31, 9);
-  ASSERT_TRUE(write_run(here / "a", size, "depth,sigma,state,flow", ramp(size, 2, 5)).ok());
-  ASSERT_TRUE(write_run(here / "b", size, "depth,sigma,state,flow", ramp(size, 2, 5)).ok());
+  ASSERT_TRUE(write_run(here / "a", size, "depth,sigma,state,bound,flow", ramp(size, 2, 5)).ok());
+  ASSERT_TRUE(write_run(here / "b", size, "depth,sigma,state,bound,flow", ramp(size, 2, 5)).ok());
   int files = 0;
   for (const auto& entry : fs::recursive_directory_iterator(here / "a")) {
     if (!entry.is_regular_file() || entry.path().filename() == "timing.json") continue;
@@ -139,7 +152,7 @@ TEST(RunFolderFiles, AreTheSameBytesTwiceButForTheTiming) {
     EXPECT_EQ(read_file(entry.path()).value(),
               read_file(here / "b" / fs::relative(entry.path(), here / "a")).value());
   }
-  EXPECT_EQ(files, 6);
+  EXPECT_EQ(files, 7);
 }
 
 TEST(RunFolderFiles, SayWhatTheRunSaysAboutItself) {
@@ -167,11 +180,54 @@ TEST(RunFolderFiles, SayWhatTheRunSaysAboutItself) {
   EXPECT_EQ(info.origin->latitude_deg, 48.1);
   ASSERT_TRUE(info.map.has_value());
   EXPECT_EQ(info.map->free_voxels, 4567U);
+  EXPECT_EQ(to_json(info), to_json(run_info_from_json(to_json(info), "again").value()));
   EXPECT_EQ(info.state_pixels[0], 80U);
   EXPECT_EQ(info.state_pixels[3], 20U);
   ASSERT_EQ(run->timing.stages.size(), 1U);
   EXPECT_EQ(run->timing.stages[0].p50, 2);
   EXPECT_EQ(run->timing.stages[0].max, 3);
+}
+
+TEST(RunFolderFiles, KeepTheHintsAndWhatTheyLookAt) {
+  const test::TemporaryFolder here;
+  const cv::Size size(10, 10);
+  ASSERT_TRUE(write_run(here / "run", size, "", ramp(size, 1, 0)).ok());
+  const RunInfo info = read_run(here / "run").value().info;
+  const RunInfo expected = some_info(size);
+  EXPECT_EQ(info.hints, expected.hints);
+  EXPECT_EQ(info.health.frames_without_pose, 7);
+  EXPECT_EQ(info.health.motions_without_scale, 8);
+  EXPECT_EQ(info.map->depths, 9000U);
+  EXPECT_EQ(info.map->depths_beyond, 800U);
+  EXPECT_EQ(info.map->depths_uncertain, 70U);
+  EXPECT_EQ(info.map->points_outside, 6U);
+  EXPECT_EQ(info.map->hits, 5000U);
+  EXPECT_EQ(info.motion.pairs, 3U);
+  EXPECT_EQ(info.motion.still_pairs, 1U);
+  EXPECT_EQ(info.motion.baseline, 0.25);
+  EXPECT_EQ(info.motion.rotation_sigma, 0.125);
+  EXPECT_EQ(info.motion.direction_sigma, 1.5);
+  EXPECT_EQ(info.masked_share, 0.0625);
+}
+
+TEST(RunFolderFiles, RefuseABoundThatTheDepthImagesDoNotHave) {
+  const test::TemporaryFolder here;
+  const cv::Size size(10, 10);
+  DepthImage depth = ramp(size, 1, 0);
+  depth.bound.release();
+  const Status status = write_run(here / "run", size, "bound", depth);
+  ASSERT_FALSE(status.ok());
+  EXPECT_THAT(status.error().message, HasSubstr("found no bound"));
+  EXPECT_FALSE(fs::exists(here / "run"));
+}
+
+TEST(RunFolderFiles, TurnABoundOfLessThanACountIntoNone) {
+  const cv::Mat metres = (cv::Mat_<float>(1, 4) << 0.0099F, 0.0101F, 1e9F, kNaN);
+  const cv::Mat counts = cv::imdecode(encode_bounds(metres, 100), cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(counts.at<std::uint16_t>(0), 0);
+  EXPECT_EQ(counts.at<std::uint16_t>(1), 1);
+  EXPECT_EQ(counts.at<std::uint16_t>(2), 65535);
+  EXPECT_EQ(counts.at<std::uint16_t>(3), 0);
 }
 
 TEST(RunFolderFiles, SaturateButNeverTurnIntoNone) {
@@ -218,9 +274,11 @@ TEST_P(CorruptRun, IsRefusedWithTheField) {
 
 INSTANTIATE_TEST_SUITE_P(With, CorruptRun,
                          testing::Values(Corruption{"BrokenJson", "{", "[", "byte"},
-                                         Corruption{"AnotherFormat", "pade run 1", "pade run 9", "format"},
+                                         Corruption{"AnotherFormat", "pade run 2", "pade run 9", "format"},
                                          Corruption{"TextForANumber", "\"range_limit_m\": 20.0",
                                                     "\"range_limit_m\": \"far\"", "range_limit_m"},
+                                         Corruption{"AnUnknownSeverity", "\"severity\": \"error\"",
+                                                    "\"severity\": \"fatal\"", "hints[0].severity"},
                                          Corruption{"AFieldMissing", "\"fx\"", "\"f\"", "camera.fx"},
                                          Corruption{"NoScale", "\"depth_scale\": 3276.0",
                                                     "\"depth_scale\": 0", "depth_scale"}),

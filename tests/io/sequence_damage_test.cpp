@@ -162,6 +162,24 @@ TEST_F(DamagedSequence, UnsortedImageListIsSortedAndReported) {
   EXPECT_THAT(sequence->notes(), ElementsAre(HasSubstr("have been sorted")));
 }
 
+TEST_F(DamagedSequence, NamesThatAreTimesSortAsNumbers) {
+  // As text "10.1" comes before "2.9", "9" and "09.5".
+  const test::TemporaryFolder here;
+  const std::vector<std::string> names = {"2.9", "9", "09.5", "10.1", "100.000000"};
+  std::string poses;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    test::write_image(here / "rgb" / (names[i] + ".png"), flight_.images[i]);
+    poses += test::pose_row(names[i], flight_.T_world_camera[i]);
+  }
+  test::write_text(here / "groundtruth.txt", poses);
+  test::write_text(here / "camera.yaml", test::camera_yaml(flight_.camera));
+  const auto sequence = Sequence::open(here.path());
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  ASSERT_EQ(sequence->size(), names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(sequence->image_file(i).stem(), names[i]);
+  EXPECT_THAT(sequence->notes(), testing::IsEmpty());
+}
+
 TEST_F(DamagedSequence, LineOfTheImageListWithoutATimeIsSkipped) {
   std::string list = "yesterday rgb/1.png\n";
   for (std::size_t i = 0; i < flight_.size(); ++i) list += flight_.stamp(i) + " " + rgb_name(i) + "\n";

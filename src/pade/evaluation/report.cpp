@@ -1,6 +1,7 @@
 #include "pade/evaluation/report.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <numeric>
 
@@ -18,6 +19,8 @@ namespace pade::evaluation {
 namespace {
 
 constexpr int kPictureWidth = 640;      // pixels in the page's pictures
+constexpr double kPageWidth = 1098;     // of drawings across the page, without their numbers
+constexpr double kHalfPage = 500;       // of two beside each other
 constexpr double kLargestError = 0.25;  // relative, the ends of the error palette
 constexpr std::size_t kSkippedShown = 20;
 
@@ -25,12 +28,22 @@ std::string tile(std::string_view value, std::string_view meaning) {
   return fmt::format("<div class=\"tile\"><b>{}</b><span>{}</span></div>\n", value, meaning);
 }
 
+/// As text of HTML, with a capital letter.
+std::string sentence(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return escape_html(text);
+}
+
 std::string sequence_name(const io::RunInfo& info) {
   const std::string name = info.sequence.filename().string();
   return name.empty() ? info.sequence.parent_path().filename().string() : name;
 }
 
-std::string header(const Report& report) {
+std::string reach_text(double reach) {
+  return fmt::format("{:.1f} m{}", reach, reach > corridor_length - 0.1 ? " or more" : "");
+}
+
+std::string header(const Report& report, const CorridorViews& corridor) {
   const io::RunInfo& info = report.info;
   std::string html =
       fmt::format("<h1>{}</h1>\n<p class=\"soft\">Obstacle map from one camera and a GPS/INS · pade {} · ",
@@ -48,6 +61,10 @@ std::string header(const Report& report) {
     html += tile(grouped_text(info.map->occupied_voxels),
                  fmt::format("occupied voxels of {:g} m", info.map->voxel));
   }
+  if (!std::isnan(corridor.reach)) {
+    html += tile(reach_text(corridor.reach),
+                 fmt::format("known free ahead of the last pose, for a sphere of {:g} m", corridor_radius));
+  }
   if (report.timing.frames_per_second > 0)
     html += tile(number_text(report.timing.frames_per_second, 1), "frames per second");
   const auto total = std::find_if(report.timing.stages.begin(), report.timing.stages.end(),
@@ -55,6 +72,15 @@ std::string header(const Report& report) {
   if (total != report.timing.stages.end())
     html += tile(fmt::format("{:.0f} ms", total->p99), "latency, 99 % of frames");
   return html + "</div>\n";
+}
+
+std::string hints_section(const std::vector<Hint>& hints) {
+  std::string html;
+  for (const Hint& hint : hints) {
+    html += fmt::format("<div class=\"{}\"><b>{}.</b> Try: {}.</div>\n", to_name(hint.severity),
+                        sentence(hint.message), escape_html(hint.advice));
+  }
+  return html;
 }
 
 // The scales that all frames share, so that pictures can be compared.
@@ -100,8 +126,8 @@ std::string state_items(const std::array<std::uint64_t, depth_state_names.size()
 
 std::string legends(const Scales& scales, bool with_flow, bool with_truth) {
   std::string html = "<div class=\"legends\">\n";
-  html +=
-      fmt::format("<div><b>Depth</b>{}</div>\n", colour_bar(0, scales.depth, Palette::turbo_near_warm, "m"));
+  html += fmt::format("<div><b>Depth, and bound that nothing is nearer than</b>{}</div>\n",
+                      colour_bar(0, scales.depth, Palette::turbo_near_warm, "m"));
   html += fmt::format("<div><b>Standard deviation σ of depth</b>{}</div>\n",
                       colour_bar(0, scales.sigma, Palette::cividis, "m"));
   if (with_truth) {
@@ -146,6 +172,10 @@ std::string frame_block(const ReportFrame& frame, const Scales& scales) {
   const cv::Mat sigma = sigma_of(depth);
   if (!sigma.empty()) html += figure("σ of depth", coloured(sigma, 0, scales.sigma, Palette::cividis));
   html += figure("state", png_uri(colourise_states(depth.state), kPictureWidth, false));
+  if (!depth.bound.empty()) {
+    html +=
+        figure("nothing is nearer than", coloured(depth.bound, 0, scales.depth, Palette::turbo_near_warm));
+  }
   if (!frame.truth.empty()) {
     html += figure("relative error", coloured(relative_error(depth, frame.truth), -kLargestError,
                                               kLargestError, Palette::blue_orange));
@@ -206,25 +236,35 @@ std::string accuracy_section(const Report& report) {
   return html + "</p>\n";
 }
 
-std::string map_section(const Report& report) {
-  if (report.occupied.empty()) return "<h2>Map</h2>\n<p class=\"soft\">Nothing is occupied.</p>\n";
+std::string figure_of(const std::string& caption, const std::string& drawing) {
+  return fmt::format("<figure><figcaption>{}</figcaption>{}</figure>\n", caption, drawing);
+}
+
+std::string stretch_text(double stretch) {
+  return stretch > 1.05 ? fmt::format(" (heights stretched {:.1f} times)", stretch) : "";
+}
+
+std::string occupancy_items() {
+  std::string html = "<p class=\"states\">";
+  for (std::size_t i = occupancy_colours.size(); i-- > 0;) {
+    html +=
+        fmt::format("<span class=\"item\"><span class=\"swatch\" style=\"background:{}\"></span>{}</span>",
+                    occupancy_colours[i], occupancy_names[i]);
+  }
+  return html + "</p>\n";
+}
+
+std::optional<MapScene> scene_of(const Report& report) {
+  if (report.map == nullptr) return std::nullopt;
   const Eigen::Vector3d up =
       report.info.world_up ? report.info.world_up->direction : Eigen::Vector3d::UnitZ();
-  const double voxel = report.info.map ? report.info.map->voxel : 0.1;
-  const MapViews views = draw_map({report.occupied, report.trajectory, voxel, up});
-  std::string html = "<h2>Map</h2>\n<div class=\"views\">\n";
-  html += fmt::format("<figure><figcaption>from above</figcaption>{}</figure>\n", views.top);
-  html += fmt::format(
-      "<figure><figcaption>from above, only what is at flight height (0.5 m around "
-      "it)</figcaption>{}</figure>\n",
-      views.slice);
-  html += fmt::format(
-      "<figure><figcaption>from the side</figcaption>{}\n<figcaption>height of occupied "
-      "voxels</figcaption>{}\n",
-      views.side, views.height_bar);
-  html += "<p class=\"soft\">Camera path in orange, from the circle to the diamond.";
+  return MapScene{*report.map, report.trajectory, up, report.look, {kPageWidth, kHalfPage, true}};
+}
+
+std::string map_notes(const Report& report, const MapViews& views) {
+  std::string html = "<p class=\"soft\">Camera path in orange, from the circle to the diamond.";
   if (views.cut_off > 0)
-    html += fmt::format(" {} scattered voxels lie outside the picture.", grouped_text(views.cut_off));
+    html += fmt::format(" {} scattered voxels lie outside the pictures.", grouped_text(views.cut_off));
   const auto options = nlohmann::ordered_json::parse(report.info.options, nullptr, false);
   const auto sigma = nlohmann::ordered_json::json_pointer("/mapper/map/hit_max_sigma");
   if (!options.is_discarded() && options.contains(sigma) && options.at(sigma).is_number()) {
@@ -232,7 +272,29 @@ std::string map_section(const Report& report) {
         " An obstacle whose depth has σ above {:g} m is not placed: what lies there stays unknown.",
         options.at(sigma).get<double>());
   }
-  html += "</p></figure>\n</div>\n";
+  return html + "</p>\n";
+}
+
+std::string map_section(const Report& report) {
+  std::string html = "<h2>Map</h2>\n";
+  const auto scene = scene_of(report);
+  if (!report.info.map || report.info.map->occupied_voxels == 0)
+    html += "<p class=\"soft\">Nothing is occupied.</p>\n";
+  const MapViews views = scene ? draw_map(*scene) : MapViews();
+  if (views.top.empty()) return html;
+  html += fmt::format("<div class=\"{}\">\n", views.wide ? "wide" : "views");
+  html += figure_of("all obstacles from above, in the colours of their heights", views.top);
+  html += figure_of("free, occupied and unknown from above, at the height of the flight", views.level);
+  html += "</div>\n<div class=\"wide\">\n";
+  html += figure_of("all obstacles from the side" + stretch_text(views.side_stretch), views.side);
+  html += figure_of("free, occupied and unknown on the upright surface through the path" +
+                        stretch_text(views.section_stretch),
+                    views.section);
+  html += fmt::format(
+      "</div>\n<div class=\"legends\">\n<div><b>Free, occupied and unknown</b>{}</div>\n<div><b>Height of "
+      "obstacles</b>{}</div>\n</div>\n",
+      occupancy_items(), views.height_bar);
+  html += map_notes(report, views);
   if (const auto& origin = report.info.origin) {
     html += fmt::format(
         "<p>The origin lies at latitude {:.7f}°, longitude {:.7f}°, {:.2f} m above the ellipsoid "
@@ -240,6 +302,22 @@ std::string map_section(const Report& report) {
         origin->latitude_deg, origin->longitude_deg, origin->height);
   }
   return html;
+}
+
+std::string corridor_section(const CorridorViews& corridor) {
+  if (corridor.level.empty()) return {};
+  std::string html = "<h2>The way ahead of the last pose</h2>\n";
+  html += fmt::format(
+      "<p>A sphere of {:g} m radius that flies straight on meets nothing but known free space for "
+      "<b>{}</b>.</p>\n",
+      corridor_radius, reach_text(corridor.reach));
+  html += "<div class=\"views\">\n";
+  html += figure_of("from above", corridor.level);
+  html += figure_of("from the side", corridor.upright);
+  html += "</div>\n" + occupancy_items();
+  return html +
+         "<p class=\"soft\">Sections through the last pose along the direction of flight; in orange what the "
+         "sphere sweeps.</p>\n";
 }
 
 std::string timing_section(const io::RunTiming& timing) {
@@ -337,9 +415,13 @@ std::string to_html(const Report& report) {
       "content=\"width=device-width, initial-scale=1\">\n<title>{} – "
       "PADE</title>\n<style>{}</style>\n</head>\n<body>\n",
       escape_html(sequence_name(report.info)), report_style);
-  html += header(report);
+  const auto scene = scene_of(report);
+  const CorridorViews corridor = scene ? draw_corridor(*scene) : CorridorViews();
+  html += header(report, corridor);
+  html += hints_section(report.info.hints);
   html += accuracy_section(report);
   html += map_section(report);
+  html += corridor_section(corridor);
   html += frames_section(report);
   html += timing_section(report.timing);
   html += health_section(report.info);

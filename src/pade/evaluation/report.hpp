@@ -12,6 +12,7 @@
 #include "pade/core/depth_image.hpp"
 #include "pade/evaluation/depth_accuracy.hpp"
 #include "pade/io/run_info.hpp"
+#include "pade/mapping/occupancy_map.hpp"
 
 namespace pade::evaluation {
 
@@ -28,10 +29,11 @@ struct ReportFrame {
 struct Report {
   io::RunInfo info;  ///< as RunWriter::completed() gives it
   io::RunTiming timing;
-  std::optional<DepthAccuracy> accuracy;    ///< empty without truth
-  std::vector<ReportFrame> frames;          ///< a few, in the order of time
-  std::vector<Eigen::Vector3f> occupied;    ///< centres of the occupied voxels, world, metres
-  std::vector<Eigen::Vector3d> trajectory;  ///< camera positions, world, metres, in the order of time
+  std::optional<DepthAccuracy> accuracy;           ///< empty without truth
+  std::vector<ReportFrame> frames;                 ///< a few, in the order of time
+  const mapping::OccupancyMap* map = nullptr;      ///< as the run left it; null where there is none
+  std::vector<Eigen::Vector3d> trajectory;         ///< camera positions, world, metres, in the order of time
+  Eigen::Vector3d look = Eigen::Vector3d::Zero();  ///< optical axis at the last of them, world
 };
 
 /// The page. Nothing in it but what the report says: the same input gives the same bytes.

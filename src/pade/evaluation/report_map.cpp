@@ -5,11 +5,14 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
+#include "pade/evaluation/corridor.hpp"
+#include "pade/evaluation/report_drawing.hpp"
 #include "pade/evaluation/report_pictures.hpp"
 
 namespace pade::evaluation {
@@ -56,74 +59,99 @@ struct Interval {
 
 using Points = std::vector<std::array<double, 3>>;  // along Axes
 
-template <class Vectors>
-Points along(const Vectors& vectors, const Axes& axes) {
+std::array<double, 3> along(const Eigen::Vector3d& v, const Axes& axes) {
+  return {axes.direction[0].dot(v), axes.direction[1].dot(v), axes.direction[2].dot(v)};
+}
+
+/// Centres of all occupied voxels; of a cube those of all its voxels.
+Points occupied_voxels(const mapping::OccupancyMap& map, const Axes& axes) {
   Points points;
-  points.reserve(vectors.size());
-  for (const auto& vector : vectors) {
-    const Eigen::Vector3d& v = vector.template cast<double>();
-    points.push_back({axes.direction[0].dot(v), axes.direction[1].dot(v), axes.direction[2].dot(v)});
+  const double voxel = map.options().voxel;
+  for (const mapping::MapCell& cell : map.occupied()) {
+    const int side = 1 << (mapping::kTreeDepth - cell.depth);
+    const Eigen::Vector3d first = cell.centre.cast<double>().array() - 0.5 * (side - 1) * voxel;
+    for (int i = 0; i < side * side * side; ++i) {
+      const Eigen::Vector3d step(i % side, i / side % side, i / (side * side));
+      points.push_back(along(first + voxel * step, axes));
+    }
   }
   return points;
 }
 
-Interval bounds(const Points& voxels, const Points& path, std::size_t axis, double margin) {
+Points along(const std::vector<Eigen::Vector3d>& vectors, const Axes& axes) {
+  Points points;
+  for (const Eigen::Vector3d& vector : vectors) points.push_back(along(vector, axes));
+  return points;
+}
+
+/// What the views show of an axis: all voxels but the outermost few, and the path.
+Interval bounds(const Points& voxels, const Points& path, std::size_t axis) {
   std::vector<double> values;
   values.reserve(voxels.size());
   for (const auto& point : voxels) values.push_back(point[axis]);
-  const auto last = static_cast<double>(values.size() - 1);
   Interval interval;
   for (const double share : {0.002, 0.998}) {
+    if (values.empty()) break;
+    const auto last = static_cast<double>(values.size() - 1);
     const auto rank = static_cast<std::ptrdiff_t>(std::lround(share * last));
     std::nth_element(values.begin(), values.begin() + rank, values.end());
     interval.include(values[static_cast<std::size_t>(rank)]);
   }
   for (const auto& point : path) interval.include(point[axis]);
-  return {interval.from - margin, interval.to + margin};
+  return interval;
 }
 
 // On the grid of the map's voxels, so that each row of voxels fills one row of pixels.
-Interval snapped(const Interval& interval, double voxel) {
-  return {std::floor(interval.from / voxel) * voxel, std::ceil(interval.to / voxel) * voxel};
-}
-
-// Voxels between the lowest and the highest point of the path, and half a metre around it.
-Points at_flight_height(const Points& voxels, const Points& path) {
-  constexpr double kAround = 0.5;
-  Interval height;
-  for (const auto& point : path) height.include(point[2]);
-  Points slice;
-  std::copy_if(voxels.begin(), voxels.end(), std::back_inserter(slice), [&](const auto& point) {
-    return point[2] >= height.from - kAround && point[2] <= height.to + kAround;
-  });
-  return slice;
+Interval snapped(const Interval& interval, double voxel, double margin) {
+  return {std::floor((interval.from - margin) / voxel) * voxel,
+          std::ceil((interval.to + margin) / voxel) * voxel};
 }
 
 // What the views share.
 struct Scene {
+  const MapScene& map;
+  const Axes& axes;
   const Points& voxels;
   const Points& path;
-  const Axes& axes;
   std::array<Interval, 3> box;
   double voxel = 0;
 };
 
+/// An axis of a drawing: one of the three, which may run backward.
+struct Across {
+  std::size_t axis = 0;
+  bool backward = false;
+};
+
+DrawingAxis drawing_axis(const Scene& scene, const Across& across) {
+  const Interval& interval = scene.box[across.axis];
+  const std::string& name = scene.axes.name[across.axis];
+  return across.backward ? DrawingAxis{interval.to, interval.from, name}
+                         : DrawingAxis{interval.from, interval.to, name};
+}
+
+/// Pixel of a value on an axis of `cells` pixels of a voxel each.
+int pixel_on(const DrawingAxis& axis, double value, double voxel, int cells) {
+  const double from_start = std::abs(value - axis.from) / voxel;
+  return std::clamp(static_cast<int>(from_start), 0, cells - 1);
+}
+
+int cells_of(const DrawingAxis& axis, double step) {
+  return std::max(1, static_cast<int>(std::lround(axis.length() / step)));
+}
+
 // One voxel per pixel; of several along the line of sight the one nearest to the viewer, who looks against
-// `toward`.
-cv::Mat heights_of(const Scene& scene, std::size_t across, std::size_t upward, std::size_t toward,
-                   double sign) {
-  const auto cells = [&](std::size_t axis) {
-    return std::max(1, static_cast<int>(std::ceil(scene.box[axis].length() / scene.voxel)));
-  };
-  const cv::Size size(cells(across), cells(upward));
+// `sign` times the axis `toward`.
+cv::Mat heights_of(const Scene& scene, const DrawingAxis& across, std::size_t across_axis,
+                   const DrawingAxis& upward, std::size_t upward_axis, double sign) {
+  const std::size_t toward = 3 - across_axis - upward_axis;
+  const cv::Size size(cells_of(across, scene.voxel), cells_of(upward, scene.voxel));
   cv::Mat heights(size, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   cv::Mat nearest(size, CV_64FC1, cv::Scalar(-std::numeric_limits<double>::infinity()));
   for (const auto& point : scene.voxels) {
     if (!scene.box[0].has(point[0]) || !scene.box[1].has(point[1]) || !scene.box[2].has(point[2])) continue;
-    const int x = std::clamp(static_cast<int>((point[across] - scene.box[across].from) / scene.voxel), 0,
-                             size.width - 1);
-    const int y = std::clamp(static_cast<int>((scene.box[upward].to - point[upward]) / scene.voxel), 0,
-                             size.height - 1);
+    const int x = pixel_on(across, point[across_axis], scene.voxel, size.width);
+    const int y = size.height - 1 - pixel_on(upward, point[upward_axis], scene.voxel, size.height);
     if (sign * point[toward] <= nearest.at<double>(y, x)) continue;
     nearest.at<double>(y, x) = sign * point[toward];
     heights.at<float>(y, x) = static_cast<float>(point[2]);
@@ -131,115 +159,225 @@ cv::Mat heights_of(const Scene& scene, std::size_t across, std::size_t upward, s
   return heights;
 }
 
-// Draws one view. Coordinates of the SVG are pixels of a drawing `kWidth` wide.
-class View {
- public:
-  View(const Scene& scene, std::size_t across, std::size_t upward)
-      : scene_(scene), across_(across), upward_(upward) {
-    constexpr double kWidth = 640, kLargestHeight = 560;
-    scale_ = std::min(kWidth / scene.box[across].length(), kLargestHeight / scene.box[upward].length());
-    width_ = scale_ * scene.box[across].length();
-    height_ = scale_ * scene.box[upward].length();
-  }
+DrawingLine line_of(const Points& path, std::size_t across, std::size_t upward) {
+  DrawingLine line;
+  for (const auto& point : path) line.push_back({point[across], point[upward]});
+  return line;
+}
 
-  std::string draw(std::string_view title, std::size_t toward, double sign) const {
-    const Interval& vertical = scene_.box[2];
-    cv::Mat picture = colourise(heights_of(scene_, across_, upward_, toward, sign), vertical.from,
-                                vertical.to, Palette::cividis);
-    // Room around for the numbers at the axes.
-    std::string svg = fmt::format(
-        R"(<svg class="map" viewBox="-58 -8 {:.0f} {:.0f}" role="img" aria-label="{}" style="max-width:{:.0f}px">)",
-        width_ + 78, height_ + 62, title, width_ + 78);
-    svg += fmt::format(
-        R"(<image href="{}" width="{:.1f}" height="{:.1f}" preserveAspectRatio="none" style="image-rendering:pixelated"/>)",
-        png_uri(picture, 4096, false), width_, height_);
-    svg += fmt::format(R"(<rect class="frame" width="{:.1f}" height="{:.1f}"/>)", width_, height_);
-    return svg + axes() + path() + scale_bar() + "</svg>";
-  }
+/// All obstacles along one direction, in the colours of their heights.
+Drawing projection(const Scene& scene, const Across& across, const Across& upward, double sign,
+                   const char* title) {
+  Drawing drawing{title, {}, drawing_axis(scene, across), drawing_axis(scene, upward), {}, {}};
+  drawing.picture =
+      colourise(heights_of(scene, drawing.across, across.axis, drawing.upward, upward.axis, sign),
+                scene.box[2].from, scene.box[2].to, Palette::cividis);
+  drawing.path = line_of(scene.path, across.axis, upward.axis);
+  return drawing;
+}
 
- private:
-  [[nodiscard]] double x(double value) const { return (value - scene_.box[across_].from) * scale_; }
-  [[nodiscard]] double y(double value) const { return (scene_.box[upward_].to - value) * scale_; }
+/// Metres per pixel of a picture of `length` metres: a voxel, or several where there would be too many
+/// pixels.
+double pixel_size(double length, double voxel) {
+  constexpr double kLargest = 1400;
+  return voxel * std::max(1.0, std::ceil(length / voxel / kLargest));
+}
 
-  [[nodiscard]] std::string axes() const {
-    std::string svg;
-    const double step = round_up_125(60 / scale_);
-    const auto first = [step](const Interval& interval) { return std::ceil(interval.from / step) * step; };
-    const auto number = [](double value) { return fmt::format("{:g}", std::abs(value) < 1e-9 ? 0 : value); };
-    for (double v = first(scene_.box[across_]); v <= scene_.box[across_].to; v += step) {
-      svg += fmt::format(
-          R"(<path class="tick" d="M{0:.1f} {1:.1f}v5"/><text x="{0:.1f}" y="{2:.1f}" text-anchor="middle">{3}</text>)",
-          x(v), height_, height_ + 19, number(v));
+/// Height of the path where it comes nearest to a place on the ground.
+double height_near(const Points& path, const std::array<double, 2>& place) {
+  const auto squared = [&](const std::array<double, 3>& p) {
+    const double a = p[0] - place[0], b = p[1] - place[1];
+    return a * a + b * b;
+  };
+  const auto nearest = std::min_element(
+      path.begin(), path.end(), [&](const auto& p, const auto& q) { return squared(p) < squared(q); });
+  return (*nearest)[2];
+}
+
+/// Free, occupied and unknown at the height of the flight, seen from above. Pixels of a block share the
+/// height.
+Drawing level_slice(const Scene& scene, const Across& across, const Across& upward) {
+  constexpr int kBlock = 8;
+  Drawing drawing{"Free, occupied and unknown space at flight height, from above",
+                  {},
+                  drawing_axis(scene, across),
+                  drawing_axis(scene, upward),
+                  line_of(scene.path, across.axis, upward.axis),
+                  {}};
+  const double step = pixel_size(std::max(drawing.across.length(), drawing.upward.length()), scene.voxel);
+  const double right = across.backward ? -step : step;
+  const double down = upward.backward ? step : -step;
+  const auto& direction = scene.axes.direction;
+  cv::Mat states(cells_of(drawing.upward, step), cells_of(drawing.across, step), CV_8UC1);
+  for (int y = 0; y < states.rows; y += kBlock) {
+    for (int x = 0; x < states.cols; x += kBlock) {
+      const cv::Rect block(x, y, std::min(kBlock, states.cols - x), std::min(kBlock, states.rows - y));
+      std::array<double, 2> first{}, middle{};
+      first[across.axis] = drawing.across.from + (x + 0.5) * right;
+      first[upward.axis] = drawing.upward.to + (y + 0.5) * down;
+      middle[across.axis] = first[across.axis] + 0.5 * (block.width - 1) * right;
+      middle[upward.axis] = first[upward.axis] + 0.5 * (block.height - 1) * down;
+      const Eigen::Vector3d corner =
+          first[0] * direction[0] + first[1] * direction[1] + height_near(scene.path, middle) * direction[2];
+      slice_of(scene.map.map, corner, right * direction[across.axis], down * direction[upward.axis],
+               block.size())
+          .copyTo(states(block));
     }
-    for (double v = first(scene_.box[upward_]); v <= scene_.box[upward_].to; v += step) {
-      svg += fmt::format(
-          R"(<path class="tick" d="M-5 {0:.1f}h5"/><text x="-9" y="{1:.1f}" text-anchor="end">{2}</text>)",
-          y(v), y(v) + 4, number(v));
+  }
+  drawing.picture = colourise_occupancy(states);
+  return drawing;
+}
+
+/// The path stretched out: distance flown over ground, and the place there.
+struct Stretched {
+  std::vector<double> distance;  // rising
+  const Points& path;
+
+  explicit Stretched(const Points& points) : path(points) {
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      distance.push_back(i == 0 ? 0
+                                : distance.back() +
+                                      std::hypot(path[i][0] - path[i - 1][0], path[i][1] - path[i - 1][1]));
     }
-    svg += fmt::format(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="middle">{} [m]</text>)", width_ / 2,
-                       height_ + 38, scene_.axes.name[across_]);
-    svg += fmt::format(
-        R"svg(<text transform="translate(-44 {:.1f}) rotate(-90)" text-anchor="middle">{} [m]</text>)svg",
-        height_ / 2, scene_.axes.name[upward_]);
-    return svg;
   }
-
-  [[nodiscard]] std::string path() const {
-    if (scene_.path.empty()) return {};
-    std::string points;
-    for (const auto& point : scene_.path)
-      points += fmt::format("{:.1f},{:.1f} ", x(point[across_]), y(point[upward_]));
-    const auto& start = scene_.path.front();
-    const auto& end = scene_.path.back();
-    std::string svg =
-        fmt::format(R"(<polyline class="halo" points="{0}"/><polyline class="path" points="{0}"/>)", points);
-    svg += fmt::format(R"(<circle class="start" cx="{:.1f}" cy="{:.1f}" r="5"/>)", x(start[across_]),
-                       y(start[upward_]));
-    svg += fmt::format(R"(<path class="end" d="M{:.1f} {:.1f}l6 6 -6 6 -6 -6z"/>)", x(end[across_]),
-                       y(end[upward_]) - 6);
-    return svg;
+  [[nodiscard]] double length() const { return distance.back(); }
+  /// Along the two level axes.
+  [[nodiscard]] std::array<double, 2> at(double flown) const {
+    const auto after = std::upper_bound(distance.begin(), distance.end(), flown);
+    if (after == distance.begin()) return {path[0][0], path[0][1]};
+    if (after == distance.end()) return {path.back()[0], path.back()[1]};
+    const auto i = static_cast<std::size_t>(after - distance.begin());
+    const double share = (flown - distance[i - 1]) / (distance[i] - distance[i - 1]);
+    return {std::lerp(path[i - 1][0], path[i][0], share), std::lerp(path[i - 1][1], path[i][1], share)};
   }
-
-  [[nodiscard]] std::string scale_bar() const {
-    const double length = round_up_125(0.08 * width_ / scale_);
-    const double right = width_ - 12, left = right - length * scale_, at = height_ - 14;
-    return fmt::format(
-        R"(<rect class="plate" x="{:.1f}" y="{:.1f}" width="{:.1f}" height="30"/><path class="scale" d="M{:.1f} {:.1f}v6h{:.1f}v-6"/><text x="{:.1f}" y="{:.1f}" text-anchor="middle">{:g} m</text>)",
-        std::min(left, right - 34) - 6, at - 20, std::max(right - left, 34.0) + 12, left, at - 2,
-        right - left, 0.5 * (left + right), at - 6, length);
-  }
-
-  const Scene& scene_;
-  std::size_t across_, upward_;
-  double scale_ = 1, width_ = 0, height_ = 0;
 };
+
+/// Free, occupied and unknown on the upright surface through the path, stretched flat.
+Drawing upright_section(const Scene& scene) {
+  const Stretched stretched(scene.path);
+  Drawing drawing{"Free, occupied and unknown space along the path, from the side",
+                  {},
+                  {0, std::max(stretched.length(), scene.voxel), "distance flown"},
+                  {scene.box[2].from, scene.box[2].to, scene.axes.name[2]},
+                  {},
+                  {}};
+  const double step = pixel_size(drawing.across.length(), scene.voxel);
+  const auto& direction = scene.axes.direction;
+  cv::Mat states(cells_of(drawing.upward, step), cells_of(drawing.across, step), CV_8UC1);
+  for (int x = 0; x < states.cols; ++x) {
+    const std::array<double, 2> at = stretched.at((x + 0.5) * step);
+    const Eigen::Vector3d top =
+        at[0] * direction[0] + at[1] * direction[1] + (drawing.upward.to - 0.5 * step) * direction[2];
+    slice_of(scene.map.map, top, Eigen::Vector3d::Zero(), -step * direction[2], {1, states.rows})
+        .copyTo(states.col(x));
+  }
+  drawing.picture = colourise_occupancy(states);
+  for (std::size_t i = 0; i < scene.path.size(); ++i)
+    drawing.path.push_back({stretched.distance[i], scene.path[i][2]});
+  return drawing;
+}
+
+std::size_t count_outside(const Scene& scene) {
+  return static_cast<std::size_t>(
+      std::count_if(scene.voxels.begin(), scene.voxels.end(), [&](const auto& point) {
+        return !scene.box[0].has(point[0]) || !scene.box[1].has(point[1]) || !scene.box[2].has(point[2]);
+      }));
+}
+
+/// The whole map where nothing is occupied, but something is free.
+Points corners_of_known(const mapping::OccupancyMap& map, const Axes& axes) {
+  const Eigen::AlignedBox3d box = map.bounds();
+  if (box.isEmpty()) return {};
+  Points corners;
+  for (const auto corner : {Eigen::AlignedBox3d::BottomLeftFloor, Eigen::AlignedBox3d::TopRightCeil})
+    corners.push_back(along(Eigen::Vector3d(box.corner(corner)), axes));
+  return corners;
+}
+
+/// What a sphere sweeps on its way, in a plane through it: its sides and its front.
+DrawingLine way_of_sphere(double reach) {
+  constexpr int kSteps = 16;
+  DrawingLine line = {{0, corridor_radius}};
+  for (int i = 0; i <= kSteps; ++i) {
+    const double angle = std::numbers::pi * (0.5 - static_cast<double>(i) / kSteps);
+    line.push_back({std::min(corridor_length, reach + corridor_radius * std::cos(angle)),
+                    corridor_radius * std::sin(angle)});
+  }
+  line.push_back({0, -corridor_radius});
+  return line;
+}
+
+/// Draws a section ahead: `upward` is the unit vector that points up on the page.
+std::string section_ahead(const MapScene& map, const FlightEnd& end, const Eigen::Vector3d& upward,
+                          const char* title, const char* upward_name, double reach) {
+  const double step = 0.5 * map.map.options().voxel;
+  Drawing drawing{title,
+                  {},
+                  {0, corridor_length, "ahead of the last pose"},
+                  {-corridor_half_width, corridor_half_width, upward_name},
+                  {},
+                  {}};
+  const cv::Size size(cells_of(drawing.across, step), cells_of(drawing.upward, step));
+  const Eigen::Vector3d corner =
+      end.position + 0.5 * step * end.direction + (corridor_half_width - 0.5 * step) * upward;
+  drawing.picture =
+      colourise_occupancy(slice_of(map.map, corner, step * end.direction, -step * upward, size));
+  drawing.corridor.push_back(way_of_sphere(reach));
+  return to_svg(drawing, map.layout.half, 300);
+}
 
 }  // namespace
 
 MapViews draw_map(const MapScene& map) {
   MapViews views;
-  if (map.occupied.empty()) return views;
   const Axes axes = axes_of(map.up);
-  const Points voxels = along(map.occupied, axes);
+  const Points voxels = occupied_voxels(map.map, axes);
   const Points path = along(map.trajectory, axes);
-  Scene scene{voxels, path, axes, {}, map.voxel};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    scene.box[axis] = snapped(bounds(voxels, path, axis, 3 * map.voxel), map.voxel);
-  }
-  views.cut_off =
-      static_cast<std::size_t>(std::count_if(voxels.begin(), voxels.end(), [&](const auto& point) {
-        return !scene.box[0].has(point[0]) || !scene.box[1].has(point[1]) || !scene.box[2].has(point[2]);
-      }));
-  views.top = View(scene, 0, 1).draw("The map from above", 2, 1);
-  const Points slice = at_flight_height(voxels, path);
-  const Scene level{slice, path, axes, scene.box, map.voxel};
-  views.slice = View(level, 0, 1).draw("The map at flight height, from above", 2, 1);
+  const Points shown = voxels.empty() ? corners_of_known(map.map, axes) : voxels;
+  if (shown.empty() || path.empty()) return views;
+  const double voxel = map.map.options().voxel;
+  Scene scene{map, axes, voxels, path, {}, voxel};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    scene.box[axis] = snapped(bounds(shown, path, axis), voxel, 3 * voxel);
+  views.cut_off = count_outside(scene);
+
+  // From above the longer extent may run across; the page is wider than high.
+  const bool first_is_longer = scene.box[0].length() >= scene.box[1].length();
+  const bool turned = map.layout.turn && scene.box[1].length() > 1.2 * scene.box[0].length();
+  const Across across = turned ? Across{1, true} : Across{0, false};
+  const Across away = turned ? Across{0, false} : Across{1, false};
+  constexpr double kWide = 1.5;
+  views.wide = scene.box[across.axis].length() > kWide * scene.box[away.axis].length();
+  const double width = views.wide ? map.layout.width : map.layout.half;
+  const double height = std::max(560.0, 0.7 * width);
+  views.top = to_svg(projection(scene, across, away, 1, "The map from above"), width, height);
+  views.level = to_svg(level_slice(scene, across, away), width, height);
   // From the side the longer horizontal extent runs across; the viewer stands where the axes stay
   // right-handed.
-  const bool first_is_longer = scene.box[0].length() >= scene.box[1].length();
-  views.side = first_is_longer ? View(scene, 0, 2).draw("The map from the side", 1, -1)
-                               : View(scene, 1, 2).draw("The map from the side", 0, 1);
+  const Drawing side = first_is_longer ? projection(scene, {0}, {2}, -1, "The map from the side")
+                                       : projection(scene, {1}, {2}, 1, "The map from the side");
+  constexpr double kLowest = 120;
+  views.side = to_svg(side, map.layout.width, 560, kLowest);
+  views.side_stretch = stretch_of(side, map.layout.width, 560, kLowest);
+  const Drawing section = upright_section(scene);
+  views.section = to_svg(section, map.layout.width, 560, kLowest);
+  views.section_stretch = stretch_of(section, map.layout.width, 560, kLowest);
   views.height_bar = colour_bar(scene.box[2].from, scene.box[2].to, Palette::cividis, "m");
+  return views;
+}
+
+CorridorViews draw_corridor(const MapScene& map) {
+  CorridorViews views;
+  if (map.trajectory.empty()) return views;
+  const FlightEnd end = end_of_flight(map.trajectory, map.look);
+  if (end.direction.isZero()) return views;
+  views.reach = known_free_reach(map.map, end, corridor_radius, corridor_length);
+  Eigen::Vector3d left = map.up.cross(end.direction);
+  if (left.norm() < 0.1) left = end.direction.unitOrthogonal();  // straight up or down
+  left.normalize();
+  views.level = section_ahead(map, end, left, "The way ahead, from above", "to the left", views.reach);
+  views.upright = section_ahead(map, end, end.direction.cross(left), "The way ahead, from the side", "upward",
+                                views.reach);
   return views;
 }
 

@@ -86,6 +86,20 @@ std::string data_uri(const cv::Mat& picture, int largest_width, int interpolatio
   return fmt::format("data:image/{};base64,{}", type == "jpg" ? "jpeg" : type, base64(bytes));
 }
 
+template <std::size_t Classes>
+cv::Mat colourise_classes(const cv::Mat& states, const std::array<std::string_view, Classes>& hex) {
+  std::array<cv::Vec3b, Classes> colours;
+  std::transform(hex.begin(), hex.end(), colours.begin(), from_hex);
+  cv::Mat picture(states.size(), CV_8UC3);
+  for (int y = 0; y < states.rows; ++y) {
+    for (int x = 0; x < states.cols; ++x) {
+      const std::size_t state = states.at<std::uint8_t>(y, x);
+      picture.at<cv::Vec3b>(y, x) = state < colours.size() ? colours[state] : cv::Vec3b();
+    }
+  }
+  return picture;
+}
+
 }  // namespace
 
 cv::Mat colourise(const cv::Mat& values, double from, double to, Palette palette) {
@@ -103,18 +117,9 @@ cv::Mat colourise(const cv::Mat& values, double from, double to, Palette palette
   return picture;
 }
 
-cv::Mat colourise_states(const cv::Mat& states) {
-  std::array<cv::Vec3b, state_colours.size()> colours;
-  std::transform(state_colours.begin(), state_colours.end(), colours.begin(), from_hex);
-  cv::Mat picture(states.size(), CV_8UC3);
-  for (int y = 0; y < states.rows; ++y) {
-    for (int x = 0; x < states.cols; ++x) {
-      const std::size_t state = states.at<std::uint8_t>(y, x);
-      picture.at<cv::Vec3b>(y, x) = state < colours.size() ? colours[state] : cv::Vec3b();
-    }
-  }
-  return picture;
-}
+cv::Mat colourise_states(const cv::Mat& states) { return colourise_classes(states, state_colours); }
+
+cv::Mat colourise_occupancy(const cv::Mat& states) { return colourise_classes(states, occupancy_colours); }
 
 cv::Mat flow_wheel(int diameter) {
   const float radius = 0.5F * static_cast<float>(diameter - 1);

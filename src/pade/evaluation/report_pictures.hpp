@@ -10,12 +10,16 @@
 #include <opencv2/core.hpp>
 
 #include "pade/core/depth_image.hpp"
+#include "pade/mapping/occupancy_map.hpp"
 
 namespace pade::evaluation {
 
 /// Colours of DepthState in the order of its values, "#rrggbb" (Okabe and Ito 2008).
 inline constexpr std::array<std::string_view, depth_state_names.size()> state_colours = {
     "#0072b2", "#e69f00", "#56b4e9", "#bbbbbb", "#cc3311", "#333333", "#009e73"};
+/// Colours of mapping::Occupancy: unknown, free, occupied. Of rising contrast also without colour.
+inline constexpr std::array<std::string_view, 3> occupancy_colours = {"#a6a6a6", "#d9f0fb", "#1b2530"};
+inline constexpr std::array<std::string_view, 3> occupancy_names = {"unknown", "free", "occupied"};
 /// Pixels without a value in all pictures.
 inline constexpr std::string_view no_value_colour = "#a6a6a6";
 
@@ -29,6 +33,8 @@ enum class Palette {
 cv::Mat colourise(const cv::Mat& values, double from, double to, Palette palette);
 /// CV_8UC1 of DepthState as BGR.
 cv::Mat colourise_states(const cv::Mat& states);
+/// CV_8UC1 of mapping::Occupancy as BGR.
+cv::Mat colourise_occupancy(const cv::Mat& states);
 /// The colour wheel of flow_colors(): direction as hue, the rim is full scale, on white.
 cv::Mat flow_wheel(int diameter);
 

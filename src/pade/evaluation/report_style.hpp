@@ -49,10 +49,13 @@ svg .path { fill: none; stroke: var(--orange); stroke-width: 2.2; stroke-linejoi
 svg .start { fill: #fff; stroke: var(--orange); stroke-width: 2.5; }
 svg .end { fill: var(--orange); stroke: #fff; stroke-width: 1.5; }
 svg .scale { fill: none; stroke: #000; stroke-width: 2; }
+svg .corridor { fill: none; stroke: var(--orange); stroke-width: 1.6; stroke-dasharray: 5 3; }
 svg .plate { fill: #ffffffd9; }
+.wide { display: grid; gap: 14px; }
 .views { display: grid; grid-template-columns: 1fr 1fr; gap: 18px; align-items: start; }
 svg.timing { width: 100%; max-width: 860px; display: block; }
 .warning { border-left: 4px solid var(--orange); background: #fdf3ec; padding: 6px 12px; margin: 6px 0; }
+.error { border-left: 4px solid #cc3311; background: #fbeae6; padding: 6px 12px; margin: 6px 0; }
 .good { border-left: 4px solid var(--blue); background: #eef5fa; padding: 6px 12px; margin: 6px 0; }
 @page { size: A4; margin: 12mm; }
 @media print { body { padding: 0; max-width: none; font-size: 11px; } h2 { break-after: avoid; } .tile b { font-size: 17px; }

@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::string_view kRunFormat = "pade run 1";
+constexpr std::string_view kRunFormat = "pade run 2";
 constexpr double kUnlimitedScale = 500;
 
 Json json_of(const Camera& camera) {
@@ -29,8 +29,40 @@ Json json_of(const RunHealth& health) {
   return {{"frames", health.frames},
           {"frames_used", health.frames_used},
           {"depth_images", health.depth_images},
+          {"frames_without_pose", health.frames_without_pose},
+          {"motions_without_scale", health.motions_without_scale},
           {"skipped", std::move(skipped)},
           {"warnings", health.warnings}};
+}
+
+Json json_of(const MapSummary& map) {
+  return {{"voxel_m", map.voxel},
+          {"occupied_voxels", map.occupied_voxels},
+          {"free_voxels", map.free_voxels},
+          {"depths", map.depths},
+          {"depths_beyond_range", map.depths_beyond},
+          {"depths_uncertain", map.depths_uncertain},
+          {"points_outside", map.points_outside},
+          {"voxel_hits", map.hits}};
+}
+
+Json json_of(const MotionSummary& motion) {
+  return {{"pairs", motion.pairs},
+          {"still_pairs", motion.still_pairs},
+          {"baseline_m", motion.baseline},
+          {"rotation_sigma_deg", motion.rotation_sigma},
+          {"direction_sigma_deg", motion.direction_sigma}};
+}
+
+Json json_of(const std::vector<Hint>& hints) {
+  Json list = Json::array();
+  for (const Hint& hint : hints) {
+    list.push_back({{"id", hint.id},
+                    {"severity", to_name(hint.severity)},
+                    {"message", hint.message},
+                    {"advice", hint.advice}});
+  }
+  return list;
 }
 
 Json json_of_states(const std::array<std::uint64_t, depth_state_names.size()>& pixels) {
@@ -59,7 +91,11 @@ class Fields {
     const Json* const found = find(name, expected);
     if (found == nullptr) return;
     if (!fits<Value>(*found)) return fail(path_ + std::string(name), *found, expected);
-    value = found->get<Value>();
+    if constexpr (NamedEnum<Value>) {
+      value = *from_name<Value>(found->template get<std::string>());
+    } else {
+      value = found->template get<Value>();
+    }
   }
 
   [[nodiscard]] Fields object(std::string_view name) {
@@ -87,6 +123,9 @@ class Fields {
   template <class Value>
   static bool fits(const Json& json) {
     if constexpr (std::is_same_v<Value, std::string>) return json.is_string();
+    if constexpr (NamedEnum<Value>) {
+      return json.is_string() && from_name<Value>(json.get<std::string>()).has_value();
+    }
     if constexpr (std::is_same_v<Value, double>) return json.is_number();
     if constexpr (std::is_same_v<Value, std::uint64_t>) return json.is_number_unsigned();
     if constexpr (std::is_same_v<Value, int>) {
@@ -140,12 +179,44 @@ void read_health(Fields fields, RunHealth& health) {
   fields.read("frames", health.frames, "a whole number");
   fields.read("frames_used", health.frames_used, "a whole number");
   fields.read("depth_images", health.depth_images, "a whole number");
+  fields.read("frames_without_pose", health.frames_without_pose, "a whole number");
+  fields.read("motions_without_scale", health.motions_without_scale, "a whole number");
   fields.read("warnings", health.warnings, "a list of sentences");
   for (Fields item : fields.list("skipped")) {
     Skipped skipped;
     item.read("file", skipped.file, "text");
     item.read("reason", skipped.reason, "text");
     health.skipped.push_back(std::move(skipped));
+  }
+}
+
+void read_map(Fields fields, MapSummary& map) {
+  fields.read("voxel_m", map.voxel, "metres");
+  fields.read("occupied_voxels", map.occupied_voxels, "a count");
+  fields.read("free_voxels", map.free_voxels, "a count");
+  fields.read("depths", map.depths, "a count");
+  fields.read("depths_beyond_range", map.depths_beyond, "a count");
+  fields.read("depths_uncertain", map.depths_uncertain, "a count");
+  fields.read("points_outside", map.points_outside, "a count");
+  fields.read("voxel_hits", map.hits, "a count");
+}
+
+void read_motion(Fields fields, MotionSummary& motion) {
+  fields.read("pairs", motion.pairs, "a count");
+  fields.read("still_pairs", motion.still_pairs, "a count");
+  fields.read("baseline_m", motion.baseline, "metres");
+  fields.read("rotation_sigma_deg", motion.rotation_sigma, "degrees");
+  fields.read("direction_sigma_deg", motion.direction_sigma, "degrees");
+}
+
+void read_hints(std::vector<Fields> items, std::vector<Hint>& hints) {
+  for (Fields& item : items) {
+    Hint hint;
+    item.read("id", hint.id, "a name");
+    item.read("severity", hint.severity, "warning or error");
+    item.read("message", hint.message, "text");
+    item.read("advice", hint.advice, "text");
+    hints.push_back(std::move(hint));
   }
 }
 
@@ -168,11 +239,8 @@ void read_optional_parts(Fields& fields, RunInfo& info) {
     origin.read("height_m", info.origin->height, "metres");
   }
   if (fields.has("map")) {
-    Fields map = fields.object("map");
     info.map.emplace();
-    map.read("voxel_m", info.map->voxel, "metres");
-    map.read("occupied_voxels", info.map->occupied_voxels, "a count");
-    map.read("free_voxels", info.map->free_voxels, "a count");
+    read_map(fields.object("map"), *info.map);
   }
 }
 
@@ -229,9 +297,13 @@ std::string to_json(const RunInfo& info) {
                {"world_up", nullptr},
                {"geographic_origin", nullptr},
                {"map", nullptr},
+               {"motion", json_of(info.motion)},
+               {"masked_share", info.masked_share},
+               {"hints", json_of(info.hints)},
                {"stacks", info.stacks},
                {"depth_scale", info.depth_scale},
                {"sigma_scale", info.sigma_scale},
+               {"bound_scale", info.bound_scale},
                {"states", json_of_states(info.state_pixels)}};
   if (info.world_up) {
     const Eigen::Vector3d& up = info.world_up->direction;
@@ -245,9 +317,7 @@ std::string to_json(const RunInfo& info) {
                                  {"height_m", info.origin->height}};
   }
   if (info.map) {
-    json["map"] = {{"voxel_m", info.map->voxel},
-                   {"occupied_voxels", info.map->occupied_voxels},
-                   {"free_voxels", info.map->free_voxels}};
+    json["map"] = json_of(*info.map);
   }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -274,18 +344,22 @@ Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file)
   fields.read("range_limit_m", info.range_limit, "metres");
   read_health(fields.object("health"), info.health);
   read_optional_parts(fields, info);
+  read_motion(fields.object("motion"), info.motion);
+  fields.read("masked_share", info.masked_share, "a share of the image");
+  read_hints(fields.list("hints"), info.hints);
   fields.read("stacks", info.stacks, "a list of names");
   fields.read("depth_scale", info.depth_scale, "counts per metre");
   fields.read("sigma_scale", info.sigma_scale, "counts per metre");
+  fields.read("bound_scale", info.bound_scale, "counts per metre");
   std::size_t state = 0;
   for (Fields item : fields.list("states")) {
     if (state < info.state_pixels.size()) item.read("pixels", info.state_pixels[state++], "a count");
   }
   if (error) return *error;
-  if (!(info.depth_scale > 0) || !(info.sigma_scale > 0)) {
-    return Error{
-        fmt::format("{}: depth_scale, sigma_scale: found {} and {}, expected positive counts per metre", file,
-                    info.depth_scale, info.sigma_scale)};
+  if (!(info.depth_scale > 0) || !(info.sigma_scale > 0) || !(info.bound_scale > 0)) {
+    return Error{fmt::format(
+        "{}: depth_scale, sigma_scale, bound_scale: found {}, {} and {}, expected positive counts per metre",
+        file, info.depth_scale, info.sigma_scale, info.bound_scale)};
   }
   info.sequence = sequence;
   info.options = options.dump();

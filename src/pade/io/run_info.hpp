@@ -12,6 +12,7 @@
 
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
+#include "pade/core/hint.hpp"
 #include "pade/core/result.hpp"
 #include "pade/io/skipped.hpp"
 #include "pade/io/world.hpp"
@@ -23,15 +24,32 @@ struct RunHealth {
   int frames = 0;                     ///< images of the sequence
   int frames_used = 0;                ///< images that had a pose and could be decoded
   int depth_images = 0;               ///< pairs of frames that gave a depth image
+  int frames_without_pose = 0;        ///< images left out because no pose is near in time
+  int motions_without_scale = 0;      ///< motions between frames that are too short for what is known of them
   std::vector<Skipped> skipped;       ///< in the order of the sequence
   std::vector<std::string> warnings;  ///< what a user should know, one sentence each
 };
 
-/// What the occupancy map holds.
+/// What the occupancy map holds, and what it was given.
 struct MapSummary {
   double voxel = 0;  ///< edge of a voxel, metres
   std::uint64_t occupied_voxels = 0;
   std::uint64_t free_voxels = 0;
+
+  std::uint64_t depths = 0;            ///< pixels (cells) with a depth, over the run
+  std::uint64_t depths_beyond = 0;     ///< of them, farther than the range of the map
+  std::uint64_t depths_uncertain = 0;  ///< of the others, too uncertain to place an obstacle
+  std::uint64_t points_outside = 0;    ///< points beyond what the octree can address
+  std::uint64_t hits = 0;              ///< voxels that got a hit, summed over the depth images
+};
+
+/// How the camera moved between the two frames of a pair, and how well that is known.
+struct MotionSummary {
+  std::uint64_t pairs = 0;
+  std::uint64_t still_pairs = 0;  ///< where even a thing 1 m away moves by less than a pixel
+  double baseline = 0;            ///< median distance between the two cameras, metres
+  double rotation_sigma = 0;      ///< median, per axis, degrees; 0 = said to be exact
+  double direction_sigma = 0;     ///< of the translation, median, per axis, degrees; 0 = said to be exact
 };
 
 /// run.json.
@@ -47,11 +65,15 @@ struct RunInfo {
   std::optional<WorldUp> world_up;  ///< empty where nobody said and the cameras do not agree
   std::optional<GeographicOrigin> origin;
   std::optional<MapSummary> map;
+  MotionSummary motion;
+  double masked_share = 0;  ///< of the image: mask and lens
+  std::vector<Hint> hints;  ///< worst first; none where all is well
 
   // Filled by RunWriter.
   double depth_scale = 0;           ///< counts per metre of depth/<time>.png
   double sigma_scale = 0;           ///< counts per metre of sigma/<time>.png
-  std::vector<std::string> stacks;  ///< of depth, sigma, state, flow: those that were saved
+  double bound_scale = 0;           ///< counts per metre of bound/<time>.png
+  std::vector<std::string> stacks;  ///< of depth, sigma, state, bound, flow: those that were saved
   std::array<std::uint64_t, depth_state_names.size()> state_pixels =
       {};  ///< pixels (cells) of each DepthState over the run
 };

@@ -109,6 +109,11 @@ Result<DepthImage> read_depth_image(const Run& run, Time time) {
     image.state = cv::Mat(counts->size(), CV_8UC1, cv::Scalar(static_cast<int>(DepthState::measured)));
     image.state.setTo(static_cast<int>(DepthState::out_of_view), *counts == 0);
   }
+  if (has_stack(run.info, "bound")) {
+    const Result<cv::Mat> bound = read_png(run, "bound", time, CV_16UC1);
+    if (!bound) return bound.error();
+    image.bound = metres_of(*bound, run.info.bound_scale);
+  }
   return image;
 }
 

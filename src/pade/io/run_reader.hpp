@@ -30,8 +30,9 @@ struct Run {
 Result<Run> read_run(const std::filesystem::path& folder);
 
 /// The depth image of one time of the stack, at full size (window 1): depth, variance where the sigma stack
-/// was saved (else all NaN), states where the state stack was saved (else measured or out_of_view). The
-/// values are those of the run up to half a count of the stack's scale.
+/// was saved (else all NaN), states where the state stack was saved (else measured or out_of_view), the bound
+/// where it was saved (else empty). The values are those of the run up to half a count of the stack's scale,
+/// bounds up to one count less.
 Result<DepthImage> read_depth_image(const Run& run, Time time);
 
 }  // namespace pade::io

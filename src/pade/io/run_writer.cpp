@@ -12,8 +12,11 @@ namespace pade::io {
 
 Result<ImageStacks> ImageStacks::parse(std::string_view names) {
   ImageStacks stacks;
-  const std::array<std::pair<std::string_view, bool*>, 4> known = {
-      {{"depth", &stacks.depth}, {"sigma", &stacks.sigma}, {"state", &stacks.state}, {"flow", &stacks.flow}}};
+  const std::array<std::pair<std::string_view, bool*>, 5> known = {{{"depth", &stacks.depth},
+                                                                    {"sigma", &stacks.sigma},
+                                                                    {"state", &stacks.state},
+                                                                    {"bound", &stacks.bound},
+                                                                    {"flow", &stacks.flow}}};
   while (!names.empty()) {
     const std::string_view name = names.substr(0, names.find(','));
     names.remove_prefix(std::min(names.size(), name.size() + 1));
@@ -22,7 +25,8 @@ Result<ImageStacks> ImageStacks::parse(std::string_view names) {
       if (candidate == name) found = *flag = true;
     }
     if (!found) {
-      return Error{fmt::format("image stacks: found '{}', expected any of depth,sigma,state,flow", name)};
+      return Error{
+          fmt::format("image stacks: found '{}', expected any of depth,sigma,state,bound,flow", name)};
     }
   }
   return stacks;
@@ -46,7 +50,14 @@ Status RunWriter::add(const DepthImage& depth, const FlowField& flow) {
   }
   const ImageStacks& save = options_.save;
   const std::string file = to_string(depth.time) + ".png";
-  if (save.depth || save.sigma || save.state) {
+  if (save.bound && depth.bound.empty()) {
+    return Error{
+        fmt::format("image stacks: found no bound in the depth image of {} s, expected one; depth made with "
+                    "these options "
+                    "has none to save",
+                    to_string(depth.time))};
+  }
+  if (save.depth || save.sigma || save.state || save.bound) {
     const DepthImage full = at_full_size(depth, options_.image_size);
     if (save.depth) {
       if (Status status = output_.write("depth/" + file, encode_metres(full.depth, scale_)); !status)
@@ -60,6 +71,10 @@ Status RunWriter::add(const DepthImage& depth, const FlowField& flow) {
     }
     if (save.state) {
       if (Status status = output_.write("state/" + file, encode_image(full.state)); !status) return status;
+    }
+    if (save.bound) {
+      if (Status status = output_.write("bound/" + file, encode_bounds(full.bound, scale_)); !status)
+        return status;
     }
   }
   if (save.flow && !flow.empty()) return output_.write("flow/" + file, encode_kitti_flow(flow.vectors));
@@ -76,12 +91,14 @@ void RunWriter::add_pose(Time time, const Pose& T_world_camera) {
 RunInfo RunWriter::completed(RunInfo info) const {
   info.depth_scale = scale_;
   info.sigma_scale = scale_;
+  info.bound_scale = scale_;
   info.range_limit = options_.range_limit;
   info.state_pixels = state_pixels_;
   info.stacks.clear();
   if (options_.save.depth) info.stacks.emplace_back("depth");
   if (options_.save.sigma) info.stacks.emplace_back("sigma");
   if (options_.save.state) info.stacks.emplace_back("state");
+  if (options_.save.bound) info.stacks.emplace_back("bound");
   if (options_.save.flow) info.stacks.emplace_back("flow");
   return info;
 }

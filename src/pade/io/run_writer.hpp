@@ -18,9 +18,9 @@ namespace pade::io {
 
 /// The image stacks that are written on request only.
 struct ImageStacks {
-  bool depth = false, sigma = false, state = false, flow = false;
+  bool depth = false, sigma = false, state = false, bound = false, flow = false;
 
-  /// Reads "depth,sigma,state,flow" (any of them, in any order; empty = none).
+  /// Reads "depth,sigma,state,bound,flow" (any of them, in any order; empty = none).
   static Result<ImageStacks> parse(std::string_view names);
 };
 
@@ -28,7 +28,7 @@ struct RunWriterOptions {
   Overwrite overwrite = Overwrite::refuse;
   ImageStacks save;
   cv::Size image_size;     ///< of the undistorted frames; depth images with window n > 1 are grown to it
-  double range_limit = 0;  ///< metres; decides the scale of the depth and sigma images. 0 = none
+  double range_limit = 0;  ///< metres; decides the scale of depth, sigma and bound images. 0 = none
 };
 
 /// One run under way. What it writes appears at its place with finish(); destroyed before that, it leaves
@@ -41,7 +41,8 @@ class RunWriter {
   /// Refuses an existing folder (without overwrite) and one that cannot be written, before any work is done.
   static Result<RunWriter> create(const std::filesystem::path& folder, const RunWriterOptions& options);
 
-  /// Writes the image stacks asked for and counts the states. `flow` may be empty.
+  /// Writes the image stacks asked for and counts the states. `flow` may be empty. Refused: a bound asked for
+  /// of a depth image that has none.
   Status add(const DepthImage& depth, const FlowField& flow = {});
   /// One row of trajectory.txt (TUM: t x y z qx qy qz qw, camera to world).
   void add_pose(Time time, const Pose& T_world_camera);

@@ -75,7 +75,7 @@ ImageInfo most_frequent(const std::vector<Candidate>& images) {
 }
 
 /// Keeps the images of the right size and depth that have a pose.
-std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, const SequenceListing& listing,
+std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, SequenceListing& listing,
                                       const Camera& camera, int bits, double largest_gap,
                                       ReadReport& report) {
   const Calibration& calibration = listing.calibration;
@@ -95,6 +95,7 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, cons
     const auto pose = listing.trajectory.at({source.time.nanoseconds + offset.nanoseconds}, largest_gap);
     if (!pose) {
       report.skip(file, "no pose: " + pose.error().message);
+      ++listing.frames_without_pose;
       continue;
     }
     const Pose T_world_camera =
@@ -120,6 +121,7 @@ Status compute_poses(const PoseSource& source, const fs::path& folder, const std
   }
   listing.trajectory = Trajectory(std::move(computed->poses));
   listing.computed = true;
+  listing.motions_without_scale = computed->motions_without_scale;
   report.notes.insert(report.notes.end(), computed->notes.begin(), computed->notes.end());
   return {};
 }
@@ -438,6 +440,8 @@ const std::optional<GeographicOrigin>& Sequence::origin() const { return data_->
 const Calibration& Sequence::calibration() const { return data_->listing.calibration; }
 const Trajectory& Sequence::trajectory() const { return data_->listing.trajectory; }
 std::size_t Sequence::listed_frames() const { return data_->listing.images.size(); }
+std::size_t Sequence::frames_without_pose() const { return data_->listing.frames_without_pose; }
+std::size_t Sequence::motions_without_scale() const { return data_->listing.motions_without_scale; }
 const std::vector<Skipped>& Sequence::skipped() const { return data_->report.skipped; }
 const std::vector<std::string>& Sequence::notes() const { return data_->report.notes; }
 

@@ -51,8 +51,9 @@ struct SequenceOptions {
 
 /// Poses that are computed instead of read.
 struct ComputedPoses {
-  std::vector<StampedPose> poses;     ///< T_world_camera at the times of the images that have a pose
-  std::vector<Matrix6d> covariances;  ///< Frame::motion_covariance of each
+  std::vector<StampedPose> poses;         ///< T_world_camera at the times of the images that have a pose
+  std::vector<Matrix6d> covariances;      ///< Frame::motion_covariance of each
+  std::size_t motions_without_scale = 0;  ///< too short for what is known of them
   std::vector<std::string> notes;
 };
 /// Computes them from the times of the images, in order, and the calibration as stated.
@@ -118,7 +119,9 @@ class Sequence {
   /// The pose file as read (of the body where calibration says so).
   [[nodiscard]] const Trajectory& trajectory() const;
 
-  [[nodiscard]] std::size_t listed_frames() const;  ///< in the folder, usable or not
+  [[nodiscard]] std::size_t listed_frames() const;          ///< in the folder, usable or not
+  [[nodiscard]] std::size_t frames_without_pose() const;    ///< skipped because no pose is near in time
+  [[nodiscard]] std::size_t motions_without_scale() const;  ///< of computed poses (ComputedPoses)
   [[nodiscard]] const std::vector<Skipped>& skipped() const;
   [[nodiscard]] const std::vector<std::string>& notes() const;  ///< used, but worth knowing
 

@@ -26,10 +26,12 @@ struct SequenceListing {
   std::vector<StampedFile> images;
   std::vector<StampedFile> depth;  ///< truth, may be empty
   std::filesystem::path pose_file;
-  Trajectory trajectory;                 ///< T_world_camera or T_world_body
-  bool poses_of_body = false;            ///< T_body_camera of `calibration` is to be applied
-  bool computed = false;                 ///< the trajectory is of the camera, at the times of the images
-  std::map<Time, Matrix6d> covariances;  ///< of computed poses: Frame::motion_covariance
+  Trajectory trajectory;                  ///< T_world_camera or T_world_body
+  bool poses_of_body = false;             ///< T_body_camera of `calibration` is to be applied
+  bool computed = false;                  ///< the trajectory is of the camera, at the times of the images
+  std::map<Time, Matrix6d> covariances;   ///< of computed poses: Frame::motion_covariance
+  std::size_t motions_without_scale = 0;  ///< of computed poses
+  std::size_t frames_without_pose = 0;    ///< known when frames and poses have met
   Calibration calibration;
   std::optional<WorldUp> world_up;  ///< where the layout itself prescribes it
 };

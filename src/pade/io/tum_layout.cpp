@@ -20,7 +20,7 @@ Result<std::vector<StampedFile>> read_image_list(const fs::path& file, std::size
   return parse_image_list(*text, file, column, report);
 }
 
-/// Image files whose names are their times.
+/// Image files whose names are their times, in order of time: as text 10.1 would come before 2.9.
 std::vector<StampedFile> files_named_by_time(const fs::path& folder, ReadReport& report) {
   std::vector<StampedFile> files;
   for (const fs::path& file : image_files(folder)) {
@@ -31,6 +31,8 @@ std::vector<StampedFile> files_named_by_time(const fs::path& folder, ReadReport&
       report.skip(file.string(), fmt::format("found name {}, expected the time in seconds", in_quotes(stem)));
     }
   }
+  std::stable_sort(files.begin(), files.end(),
+                   [](const StampedFile& a, const StampedFile& b) { return a.time < b.time; });
   return files;
 }
 

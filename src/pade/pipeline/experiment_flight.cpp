@@ -44,10 +44,8 @@ Moment moment_of(const MapperUpdate& update, const cv::Mat& image, double flown,
   moment.image = image.clone();
   moment.flow = update.flow.vectors.clone();
   moment.depth = at_full_size(update.depth, image.size()).depth.clone();
-  std::vector<Eigen::Vector3f> occupied;
-  for (const mapping::MapCell& cell : mapper.map().occupied()) occupied.push_back(cell.centre);
   const Eigen::Vector3d up = sequence.world_up() ? sequence.world_up()->direction : Eigen::Vector3d::UnitZ();
-  moment.map = evaluation::draw_map({occupied, path, mapper.options().map.voxel, up});
+  moment.map = evaluation::draw_map({mapper.map(), path, up});
   return moment;
 }
 

@@ -12,10 +12,12 @@
 #include "pade/core/version.hpp"
 #include "pade/evaluation/accuracy_tables.hpp"
 #include "pade/evaluation/report.hpp"
+#include "pade/evaluation/run_hints.hpp"
 #include "pade/io/cloud_files.hpp"
 #include "pade/io/map_files.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/pipeline/navigation_run.hpp"
+#include "pade/pipeline/run_tally.hpp"
 
 namespace pade {
 namespace {
@@ -34,6 +36,10 @@ Loaded load(const io::Sequence& sequence, std::size_t i) {
     if (auto truth = sequence.truth(i)) loaded.truth = *truth;
   }
   return loaded;
+}
+
+double masked_share(const cv::Mat& mask) {
+  return 1 - static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
 }
 
 /// Reads frames in order, with a second thread one frame ahead.
@@ -68,7 +74,8 @@ class Run {
         writer_(writer),
         mapper_(std::move(mapper)),
         cloud_(options.cloud),
-        accuracy_(options.mapper.depth.range) {
+        accuracy_(options.mapper.depth.range),
+        tally_(sequence.camera(), options.mapper.map) {
     const std::size_t pairs = sequence.size() - std::min(sequence.size(), step());
     for (const std::size_t pair : evaluation::evenly_spread(pairs, kReportFrames)) {
       shown_.push_back(sequence.time(options.mapper.order == Order::newest ? pair + step() : pair));
@@ -93,6 +100,7 @@ class Run {
     ++used_;
     writer_.add_pose(frame.time, mapper_.T_world_camera());
     path_.push_back(mapper_.T_world_camera().translation);
+    look_ = mapper_.T_world_camera().matrix3().col(2);
     return update.outcome == MapperUpdate::Outcome::mapped ? take(update, frame.image) : Status();
   }
 
@@ -104,6 +112,7 @@ class Run {
   Result<MapResult> finish(double seconds) {
     MapResult result;
     result.info = writer_.completed(info());
+    result.info.hints = evaluation::hints_of(result.info);
     result.timing = timing(seconds);
     if (!accuracy_.empty()) result.accuracy = accuracy_.result();
     if (Status status = write(result); !status) return status.error();
@@ -122,13 +131,19 @@ class Run {
     const cv::Mat& image = options_.mapper.order == Order::newest ? newest : update.reference.image;
     const cv::Mat& truth = truths_[time];
     accuracy_.add(update.depth, truth);
+    tally_.add(update);
     cloud_.add(update.depth, sequence_.camera(), update.reference.T_world_camera, image);
     if (options_.report && std::find(shown_.begin(), shown_.end(), time) != shown_.end()) {
       frames_.push_back({to_string(time),
                          image.clone(),
                          update.flow.vectors.clone(),
-                         {time, update.depth.window, update.depth.depth.clone(),
-                          update.depth.variance.clone(), update.depth.state.clone()},
+                         {time,
+                          update.depth.window,
+                          update.depth.depth.clone(),
+                          update.depth.variance.clone(),
+                          update.depth.state.clone(),
+                          {},
+                          update.depth.bound.clone()},
                          truth.clone()});
     }
     return writer_.add(update.depth, update.flow);
@@ -146,13 +161,16 @@ class Run {
     info.health.frames = static_cast<int>(sequence_.listed_frames());
     info.health.frames_used = static_cast<int>(used_);
     info.health.depth_images = static_cast<int>(mapper_.health().mapped);
+    info.health.frames_without_pose = static_cast<int>(sequence_.frames_without_pose());
+    info.health.motions_without_scale = static_cast<int>(sequence_.motions_without_scale());
     info.health.skipped = sequence_.skipped();
     info.health.skipped.insert(info.health.skipped.end(), undecodable_.begin(), undecodable_.end());
     info.health.warnings = sequence_.notes();
     info.world_up = sequence_.world_up();
     info.origin = sequence_.origin();
-    const auto counts = mapper_.map().counts();
-    info.map = io::MapSummary{options_.mapper.map.voxel, counts.occupied, counts.free};
+    info.map = tally_.map_summary(mapper_.map());
+    info.motion = tally_.motion_summary();
+    info.masked_share = masked_share(sequence_.mask());
     return info;
   }
 
@@ -187,9 +205,8 @@ class Run {
   }
 
   std::string report(const MapResult& result) {
-    evaluation::Report report{result.info, result.timing, result.accuracy, std::move(frames_), {}, path_};
-    for (const mapping::MapCell& cell : mapper_.map().occupied()) report.occupied.push_back(cell.centre);
-    return evaluation::to_html(report);
+    return evaluation::to_html(
+        {result.info, result.timing, result.accuracy, std::move(frames_), &mapper_.map(), path_, look_});
   }
 
   const io::Sequence& sequence_;
@@ -198,11 +215,13 @@ class Run {
   ObstacleMapper mapper_;
   mapping::CloudBuilder cloud_;
   evaluation::Accumulator accuracy_;
+  RunTally tally_;
   std::vector<Time> shown_;  // frames of the report
   std::vector<evaluation::ReportFrame> frames_;
   std::map<Time, cv::Mat> truths_;  // of the frames whose depth may still come
   std::vector<io::Skipped> undecodable_;
   std::vector<Eigen::Vector3d> path_;
+  Eigen::Vector3d look_ = Eigen::Vector3d::Zero();  // optical axis at the last pose
   std::array<std::vector<double>, stage_names.size()> milliseconds_;
   std::size_t used_ = 0;
 };

@@ -183,6 +183,7 @@ io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) 
       result.covariances.push_back(i > 0 ? trajectory->motions[i - 1].covariance : Matrix6d::Zero());
     }
     const auto doubtful = std::count(trajectory->scale_valid.begin(), trajectory->scale_valid.end(), false);
+    result.motions_without_scale = static_cast<std::size_t>(doubtful);
     if (doubtful > 0) {
       result.notes.push_back(
           fmt::format("{} of {} motions between frames are too short for what the filter knows of them "
