@@ -40,7 +40,7 @@ std::string head(const MapAccuracy& a) {
       "{} of {} frames have a pose ({:.1f} %); {} of them a true one; voxels of {} m, range {} m; nearest "
       "surface {:.2f} m\n",
       a.frames_with_pose, a.frames, 100 * share(a.frames_with_pose, a.frames), a.frames_compared, a.voxel,
-      a.range);
+      a.range, a.clearance);
   if (!a.alignment) return text + "Alignment: none, the map is taken as it lies\n";
   const RigidAlignment& r = *a.alignment;
   return text + fmt::format(
