@@ -2,6 +2,7 @@
 
 #ifdef PADE_HAS_SIMULATION
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -38,6 +39,7 @@ using evaluation::MapMeasures;
 constexpr double kShortestStep = 0.01;  // metres
 /// The view ahead is asked from here on: before, the map has hardly begun.
 constexpr std::size_t kFirstFrames = 5;
+constexpr double kFarthestClearance = 10;  // metres
 
 /// The world with everything that truth is taken from.
 struct KnownWorld {
@@ -166,10 +168,13 @@ Status measure_maps(const OpenRun& run, const KnownWorld& world, const EvaluateM
 
   const Camera& camera = run.sequence.camera();
   const simulation::RayGrid grid(camera);
+  accuracy.clearance = kFarthestClearance;
   Progress progress("Comparing", run.frames.size());
   for (const ComparedFrame& frame : run.frames) {
     const cv::Mat depth = exact_depth(world.scene, grid, frame.T_world_camera);
     const Pose T_map_camera = T_map_world * frame.T_world_camera;
+    accuracy.clearance =
+        std::min(accuracy.clearance, in_world.distance(frame.T_world_camera.translation, accuracy.clearance));
     seen.add(depth, camera, T_map_camera);
     if (frame.direction)
       accuracy.ahead += evaluation::ahead_shares(*map, depth, camera, T_map_camera, *frame.direction);

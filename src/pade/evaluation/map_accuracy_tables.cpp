@@ -37,9 +37,10 @@ std::string number(std::uint64_t n) { return fmt::format("{:10}", n); }
 
 std::string head(const MapAccuracy& a) {
   std::string text = fmt::format(
-      "{} of {} frames have a pose ({:.1f} %); {} of them a true one; voxels of {} m, range {} m\n",
+      "{} of {} frames have a pose ({:.1f} %); {} of them a true one; voxels of {} m, range {} m; nearest "
+      "surface {:.2f} m\n",
       a.frames_with_pose, a.frames, 100 * share(a.frames_with_pose, a.frames), a.frames_compared, a.voxel,
-      a.range);
+      a.range, a.clearance);
   if (!a.alignment) return text + "Alignment: none, the map is taken as it lies\n";
   const RigidAlignment& r = *a.alignment;
   return text + fmt::format(
@@ -182,6 +183,7 @@ std::string to_json(const MapAccuracy& a) {
                {"voxel_m", a.voxel},
                {"range_m", a.range},
                {"seen_depth_m", a.seen_depth},
+               {"clearance_m", a.clearance},
                {"alignment", nullptr}};
   if (a.alignment) {
     const RigidAlignment& r = *a.alignment;

@@ -21,11 +21,12 @@ struct MapMeasures {
 
 /// Everything that `pade evaluate RUN --world W` says of a run.
 struct MapAccuracy {
-  std::size_t frames = 0;                   ///< of the sequence
-  std::size_t frames_with_pose = 0;         ///< of the run
-  std::size_t frames_compared = 0;          ///< of them that have a true pose
-  double voxel = 0, range = 0;              ///< of the run's map, m
-  double seen_depth = 0;                    ///< up to which surface counts as seen, m
+  std::size_t frames = 0;            ///< of the sequence
+  std::size_t frames_with_pose = 0;  ///< of the run
+  std::size_t frames_compared = 0;   ///< of them that have a true pose
+  double voxel = 0, range = 0;       ///< of the run's map, m
+  double seen_depth = 8;             ///< up to which surface counts as seen, m
+  double clearance = 0;              ///< least distance of a true camera from the surface, m; at most 10
   std::optional<RigidAlignment> alignment;  ///< empty: none was asked for
   MapMeasures map;
   AheadShares ahead;                        ///< with the finished map
