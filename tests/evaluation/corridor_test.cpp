@@ -16,7 +16,7 @@ TEST(KnownFreeReach, EndsARadiusBeforeTheWall) {
   const auto map = test::free_lane(8);
   for (const double start : {0.5, 2.0, 6.0}) {
     const FlightEnd end{{start, 0.02, -0.03}, Eigen::Vector3d::UnitX()};
-    EXPECT_NEAR(known_free_reach(map, end, kRadius, 15), 8 - kRadius - start, 0.026) << start;
+    EXPECT_NEAR(known_free_reach(map, end, kRadius, 15).distance, 8 - kRadius - start, 0.026) << start;
   }
 }
 
@@ -25,20 +25,31 @@ TEST(KnownFreeReach, EndsAtUnknownSpaceToo) {
   // Obliquely out of the lane, whose side is 1.5 m from the axis.
   const Eigen::Vector3d direction = Eigen::Vector3d(1, 1, 0).normalized();
   const double expected = (1.5 - kRadius) * std::sqrt(2.0);
-  EXPECT_NEAR(known_free_reach(map, {{2, 0, 0}, direction}, kRadius, 15), expected, 0.03);
+  EXPECT_NEAR(known_free_reach(map, {{2, 0, 0}, direction}, kRadius, 15).distance, expected, 0.03);
+}
+
+TEST(KnownFreeReach, SaysWhatItMeets) {
+  const auto map = test::free_lane(8);
+  const Eigen::Vector3d forward = Eigen::Vector3d::UnitX();
+  EXPECT_EQ(known_free_reach(map, {{1, 0, 0}, forward}, kRadius, 15).stopped_by,
+            mapping::Occupancy::occupied);
+  EXPECT_EQ(known_free_reach(map, {{1, 0, 0}, forward}, kRadius, 3).stopped_by, mapping::Occupancy::free);
+  EXPECT_EQ(known_free_reach(map, {{4, 0, 0}, Eigen::Vector3d::UnitZ()}, kRadius, 15).stopped_by,
+            mapping::Occupancy::unknown);
 }
 
 TEST(KnownFreeReach, IsAtMostWhatIsAskedFor) {
   const auto map = test::free_lane(8);
-  EXPECT_NEAR(known_free_reach(map, {{1, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 3), 3, 0.026);
+  EXPECT_NEAR(known_free_reach(map, {{1, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 3).distance, 3, 0.026);
 }
 
 TEST(KnownFreeReach, TakesTheVehiclesOwnPlaceAsFree) {
   // The lane begins at x = 0; a vehicle there has unknown space around its rear half.
   const auto map = test::free_lane(8);
-  EXPECT_NEAR(known_free_reach(map, {{0.05, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 15), 7.6, 0.026);
+  EXPECT_NEAR(known_free_reach(map, {{0.05, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 15).distance, 7.6,
+              0.026);
   // Well outside there is nothing known ahead at all.
-  EXPECT_LT(known_free_reach(map, {{-3, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 15), 0.11);
+  EXPECT_LT(known_free_reach(map, {{-3, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 15).distance, 0.11);
 }
 
 TEST(KnownFreeReach, SeesAThinPoleBesideTheAxis) {
@@ -48,8 +59,10 @@ TEST(KnownFreeReach, SeesAThinPoleBesideTheAxis) {
   const auto map = std::move(mapping::OccupancyMap::create({}, std::move(tree))).value();
   // The pole covers x 5.0 .. 5.1, y 0.2 .. 0.3: touched where (5 - s)^2 + 0.2^2 = r^2.
   const double expected = 5 - std::sqrt(kRadius * kRadius - 0.2 * 0.2) - 1;
-  EXPECT_NEAR(known_free_reach(map, {{1, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 15), expected, 0.026);
-  EXPECT_NEAR(known_free_reach(map, {{1, 0, 0}, Eigen::Vector3d::UnitX()}, 0.15, 15), 9 - 0.15, 0.026);
+  EXPECT_NEAR(known_free_reach(map, {{1, 0, 0}, Eigen::Vector3d::UnitX()}, kRadius, 15).distance, expected,
+              0.026);
+  EXPECT_NEAR(known_free_reach(map, {{1, 0, 0}, Eigen::Vector3d::UnitX()}, 0.15, 15).distance, 9 - 0.15,
+              0.026);
 }
 
 TEST(EndOfFlight, IsTheLastHalfMetreOrTheCamera) {

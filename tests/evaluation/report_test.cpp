@@ -107,7 +107,8 @@ TEST(Report, SaysTheHintsBeforeAnythingElse) {
 
 TEST(Report, ShowsTheWayAheadWithItsReach) {
   const std::string html = to_html(some_report());
-  EXPECT_THAT(html, AllOf(HasSubstr("The way ahead of the last pose"), HasSubstr("<b>5.6 m</b>"),
+  EXPECT_THAT(html, AllOf(HasSubstr("The way ahead of the last pose"),
+                          HasSubstr("<b>5.6 m</b>; then it touches an obstacle"),
                           HasSubstr(std::string(occupancy_colours[0])),
                           HasSubstr(std::string(occupancy_colours[1]))));
   Report hovering = some_report();
@@ -209,7 +210,7 @@ TEST(MapViews, ShowFreeOccupiedAndUnknownWhereTheyAre) {
   EXPECT_EQ(pixels_of(level, mapping::Occupancy::occupied), 2 * 30);
   EXPECT_EQ(pixels_of(level, mapping::Occupancy::unknown), static_cast<int>(level.total()) - 82 * 30);
   const cv::Mat section = picture_of(views.section);
-  EXPECT_EQ(section.cols, 82);
+  EXPECT_EQ(section.cols, 82 + 150) << "the path and 15 m ahead";
   EXPECT_EQ(pixels_of(section, mapping::Occupancy::free), 80 * 30);
   EXPECT_EQ(pixels_of(section, mapping::Occupancy::occupied), 2 * 30);
 }

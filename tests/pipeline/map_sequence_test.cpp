@@ -71,11 +71,14 @@ class MapSequence : public testing::Test {
     for (const auto& entry : fs::recursive_directory_iterator(root_ / run)) {
       const std::string name = entry.path().lexically_relative(root_ / run);
       if (!entry.is_regular_file() || name == "timing.json" || name == "report.html") continue;
-      std::ostringstream text;
-      text << std::ifstream(entry.path(), std::ios::binary).rdbuf();
-      files[name] = text.str();
+      files[name] = content_of(entry.path());
     }
     return files;
+  }
+  static std::string content_of(const fs::path& file) {
+    std::ostringstream text;
+    text << std::ifstream(file, std::ios::binary).rdbuf();
+    return text.str();
   }
 
   fs::path root_;
@@ -97,6 +100,38 @@ TEST_F(MapSequence, WritesEverythingThatTheDesignPromises) {
   EXPECT_LT(result->accuracy->all.relative_median, 0.2);
   EXPECT_GT(result->timing.peak_memory, 1000000U);
   ASSERT_TRUE(io::read_run(root_ / "run"));
+}
+
+TEST_F(MapSequence, AGoodRunHasNoHintsAndItsCountsAddUp) {
+  const auto result = map("run");
+  ASSERT_TRUE(result) << result.error().message;
+  const io::RunInfo& info = result->info;
+  for (const Hint& hint : info.hints) ADD_FAILURE() << hint.id << ": " << hint.message;
+  EXPECT_EQ(info.map->depths, info.state_pixels[static_cast<std::size_t>(DepthState::measured)]);
+  EXPECT_LE(info.map->depths_beyond + info.map->depths_uncertain, info.map->depths);
+  EXPECT_GT(info.map->hits, 0U);
+  EXPECT_EQ(info.motion.pairs, 5U);
+  EXPECT_EQ(info.motion.still_pairs, 0U);
+  const Eigen::Vector3d step = io::Sequence::open(sequence())->pose(1).translation -
+                               io::Sequence::open(sequence())->pose(0).translation;
+  EXPECT_NEAR(info.motion.baseline, step.norm(), 0.3 * step.norm());
+  EXPECT_EQ(info.motion.rotation_sigma, 0) << "exact poses";
+  EXPECT_EQ(info.masked_share, 0);
+}
+
+TEST_F(MapSequence, AnEmptyMapIsSaidEverywhere) {
+  MapSequenceOptions options;
+  options.mapper.map.hit_max_sigma = 0;
+  const auto result = map("run", options);
+  ASSERT_TRUE(result) << result.error().message;
+  const auto run = io::read_run(root_ / "run");
+  ASSERT_TRUE(run) << run.error().message;
+  ASSERT_FALSE(run->info.hints.empty());
+  EXPECT_EQ(run->info.hints, result->info.hints);
+  EXPECT_EQ(run->info.hints[0].id, "empty-map");
+  EXPECT_EQ(run->info.map->depths_uncertain + run->info.map->depths_beyond, run->info.map->depths);
+  const std::string report = content_of(root_ / "run" / "report.html");
+  EXPECT_THAT(report, HasSubstr("The map is empty"));
 }
 
 TEST_F(MapSequence, TwiceAndWithTwoThreadsGivesTheSameBytes) {

@@ -11,9 +11,10 @@ double distance_to_voxel(const Eigen::Vector3d& point, const Eigen::Vector3d& ce
   return ((point - centre).cwiseAbs().array() - 0.5 * voxel).max(0).matrix().norm();
 }
 
-/// Whether all that a sphere touches at `centre` is free, but for what it touches at `start`.
-bool is_clear(const mapping::OccupancyMap& map, const Eigen::Vector3d& centre, const Eigen::Vector3d& start,
-              double radius) {
+/// The worst of what a sphere touches at `centre`, but for what it touches at `start`.
+mapping::Occupancy worst_at(const mapping::OccupancyMap& map, const Eigen::Vector3d& centre,
+                            const Eigen::Vector3d& start, double radius) {
+  mapping::Occupancy worst = mapping::Occupancy::free;
   const double voxel = map.options().voxel;
   const Eigen::Vector3d low = ((centre.array() - radius) / voxel).floor();
   const Eigen::Vector3d high = ((centre.array() + radius) / voxel).floor();
@@ -23,11 +24,13 @@ bool is_clear(const mapping::OccupancyMap& map, const Eigen::Vector3d& centre, c
         const Eigen::Vector3d at = voxel * (Eigen::Vector3d(x, y, z).array() + 0.5);
         if (distance_to_voxel(centre, at, voxel) > radius) continue;
         if (distance_to_voxel(start, at, voxel) <= radius) continue;
-        if (map.at(at) != mapping::Occupancy::free) return false;
+        const mapping::Occupancy state = map.at(at);
+        if (state == mapping::Occupancy::occupied) return state;
+        if (state == mapping::Occupancy::unknown) worst = state;
       }
     }
   }
-  return true;
+  return worst;
 }
 
 }  // namespace
@@ -42,13 +45,14 @@ FlightEnd end_of_flight(const std::vector<Eigen::Vector3d>& path, const Eigen::V
   return {end, (way.norm() >= kShortest ? way : look).normalized()};
 }
 
-double known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
-                        double farthest) {
+Reach known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
+                       double farthest) {
   const double step = 0.25 * map.options().voxel;
-  double reach = 0;
+  Reach reach;
   for (int i = 1; i * step <= farthest; ++i) {
-    if (!is_clear(map, from.position + i * step * from.direction, from.position, radius)) break;
-    reach = i * step;
+    reach.stopped_by = worst_at(map, from.position + i * step * from.direction, from.position, radius);
+    if (reach.stopped_by != mapping::Occupancy::free) break;
+    reach.distance = i * step;
   }
   return reach;
 }

@@ -21,11 +21,17 @@ struct FlightEnd {
 /// @param path  camera positions, world, metres, in order of time, at least one
 FlightEnd end_of_flight(const std::vector<Eigen::Vector3d>& path, const Eigen::Vector3d& look);
 
+/// How far a sphere gets, and what it meets there.
+struct Reach {
+  double distance = 0;                                       ///< of its centre from the start, metres
+  mapping::Occupancy stopped_by = mapping::Occupancy::free;  ///< free where nothing stops it
+};
+
 /// How far the centre of a sphere can go straight on from `from`, until the sphere first meets a voxel that
-/// is not known to be free (metres, to a quarter of a voxel, at most `farthest`). Voxels that the sphere
+/// is not known to be free (to a quarter of a voxel, at most `farthest` metres). Voxels that the sphere
 /// touches where it starts count as free: the vehicle is there.
-double known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
-                        double farthest);
+Reach known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
+                       double farthest);
 
 /// CV_8UC1 of mapping::Occupancy over a rectangle in space.
 /// @param corner  centre of the top left pixel, world, metres

@@ -287,7 +287,7 @@ std::string map_section(const Report& report) {
   html += figure_of("free, occupied and unknown from above, at the height of the flight", views.level);
   html += "</div>\n<div class=\"wide\">\n";
   html += figure_of("all obstacles from the side" + stretch_text(views.side_stretch), views.side);
-  html += figure_of("free, occupied and unknown on the upright surface through the path" +
+  html += figure_of("free, occupied and unknown on the upright surface through the path and straight ahead" +
                         stretch_text(views.section_stretch),
                     views.section);
   html += fmt::format(
@@ -304,13 +304,24 @@ std::string map_section(const Report& report) {
   return html;
 }
 
+std::string stop_text(mapping::Occupancy stopped_by) {
+  switch (stopped_by) {
+    case mapping::Occupancy::occupied:
+      return "; then it touches an obstacle";
+    case mapping::Occupancy::unknown:
+      return "; then it touches unknown space";
+    default:
+      return {};
+  }
+}
+
 std::string corridor_section(const CorridorViews& corridor) {
   if (corridor.level.empty()) return {};
   std::string html = "<h2>The way ahead of the last pose</h2>\n";
   html += fmt::format(
       "<p>A sphere of {:g} m radius that flies straight on meets nothing but known free space for "
-      "<b>{}</b>.</p>\n",
-      corridor_radius, reach_text(corridor.reach));
+      "<b>{}</b>{}.</p>\n",
+      corridor_radius, reach_text(corridor.reach), stop_text(corridor.stopped_by));
   html += "<div class=\"views\">\n";
   html += figure_of("from above", corridor.level);
   html += figure_of("from the side", corridor.upright);

@@ -228,12 +228,13 @@ Drawing level_slice(const Scene& scene, const Across& across, const Across& upwa
   return drawing;
 }
 
-/// The path stretched out: distance flown over ground, and the place there.
+/// The path stretched out, and straight on from its end: distance over ground, and the place there.
 struct Stretched {
   std::vector<double> distance;  // rising
   const Points& path;
+  std::array<double, 3> ahead;  // direction of flight at the end, along the axes
 
-  explicit Stretched(const Points& points) : path(points) {
+  Stretched(const Points& points, const std::array<double, 3>& direction) : path(points), ahead(direction) {
     for (std::size_t i = 0; i < path.size(); ++i) {
       distance.push_back(i == 0 ? 0
                                 : distance.back() +
@@ -245,19 +246,24 @@ struct Stretched {
   [[nodiscard]] std::array<double, 2> at(double flown) const {
     const auto after = std::upper_bound(distance.begin(), distance.end(), flown);
     if (after == distance.begin()) return {path[0][0], path[0][1]};
-    if (after == distance.end()) return {path.back()[0], path.back()[1]};
+    if (after == distance.end()) {
+      const double level = std::hypot(ahead[0], ahead[1]);
+      const double beyond = level > 0 ? (flown - distance.back()) / level : 0;
+      return {path.back()[0] + beyond * ahead[0], path.back()[1] + beyond * ahead[1]};
+    }
     const auto i = static_cast<std::size_t>(after - distance.begin());
     const double share = (flown - distance[i - 1]) / (distance[i] - distance[i - 1]);
     return {std::lerp(path[i - 1][0], path[i][0], share), std::lerp(path[i - 1][1], path[i][1], share)};
   }
 };
 
-/// Free, occupied and unknown on the upright surface through the path, stretched flat.
+/// Free, occupied and unknown on the upright surface through the path and the way ahead, stretched flat.
 Drawing upright_section(const Scene& scene) {
-  const Stretched stretched(scene.path);
+  const FlightEnd end = end_of_flight(scene.map.trajectory, scene.map.look);
+  const Stretched stretched(scene.path, along(end.direction, scene.axes));
   Drawing drawing{"Free, occupied and unknown space along the path, from the side",
                   {},
-                  {0, std::max(stretched.length(), scene.voxel), "distance flown"},
+                  {0, stretched.length() + corridor_length, "distance flown, then straight ahead"},
                   {scene.box[2].from, scene.box[2].to, scene.axes.name[2]},
                   {},
                   {}};
@@ -371,7 +377,9 @@ CorridorViews draw_corridor(const MapScene& map) {
   if (map.trajectory.empty()) return views;
   const FlightEnd end = end_of_flight(map.trajectory, map.look);
   if (end.direction.isZero()) return views;
-  views.reach = known_free_reach(map.map, end, corridor_radius, corridor_length);
+  const Reach reach = known_free_reach(map.map, end, corridor_radius, corridor_length);
+  views.reach = reach.distance;
+  views.stopped_by = reach.stopped_by;
   Eigen::Vector3d left = map.up.cross(end.direction);
   if (left.norm() < 0.1) left = end.direction.unitOrthogonal();  // straight up or down
   left.normalize();

@@ -33,7 +33,7 @@ struct MapViews {
   std::string top;         ///< all obstacles seen from above, coloured by height
   std::string level;       ///< free, occupied and unknown at the height of the nearest point of the path
   std::string side;        ///< all obstacles seen level, along the shorter horizontal extent
-  std::string section;     ///< free, occupied and unknown on the upright surface through the path
+  std::string section;     ///< free, occupied and unknown on the upright surface through the path and ahead
   std::string height_bar;  ///< the colours of top and side
   double side_stretch = 1, section_stretch = 1;  ///< how much heights are stretched there
   bool wide = false;                             ///< the views from above fill MapLayout::width, not half
@@ -49,7 +49,8 @@ inline constexpr double corridor_half_width = 3;  ///< metres
 /// Empty where there is no pose.
 struct CorridorViews {
   std::string level, upright;
-  double reach = std::numeric_limits<double>::quiet_NaN();  ///< known_free_reach() of the sphere, metres
+  double reach = std::numeric_limits<double>::quiet_NaN();   ///< known_free_reach() of the sphere, metres
+  mapping::Occupancy stopped_by = mapping::Occupancy::free;  ///< what the sphere meets there
 };
 CorridorViews draw_corridor(const MapScene& map);
 
