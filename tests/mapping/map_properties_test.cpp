@@ -29,7 +29,14 @@ using simulation::make_analytic_flight;
 
 const Camera kSmall = simulation::analytic_camera(128, 96);
 
-OccupancyMap new_map(const MapOptions& options = {}) {
+/// What one image shows is believed at once, so that one image is enough to see what it says.
+MapOptions one_look() {
+  MapOptions options;
+  options.looks_baseline = 0;
+  return options;
+}
+
+OccupancyMap new_map(const MapOptions& options = one_look()) {
   return std::move(OccupancyMap::create(options)).value();
 }
 
@@ -126,7 +133,7 @@ TEST(MapUpdate, ClearsOnlyWhatIsSeenAndLiesTwoSigmaBeforeTheSurface) {
   }
 }
 
-TEST(MapUpdate, LearnsNothingFromPixelsThatAreNotMeasured) {
+TEST(MapUpdate, LearnsNothingFromPixelsThatAreNotMeasuredAndHaveNoBound) {
   const AnalyticFlight flight = tilted("forward");
   const DepthImage exact = depth_image(flight, 0);
   for (const DepthState state : {DepthState::epipole, DepthState::low_parallax, DepthState::no_texture,
@@ -253,7 +260,7 @@ TEST(MapUpdate, DoesNotClearTheEdgeOfAnObstacleThatWindowsHaveBlurred) {
 TEST(MapUpdate, AgreesWithOctoMapsOwnRayCastingWithoutNoise) {
   const AnalyticFlight flight = tilted("courtyard");
   const Pose& pose = flight.T_world_camera[0];
-  MapOptions options;
+  MapOptions options = one_look();
   options.range = 7;
   const DepthImage image = depth_image(flight, 0);
   OccupancyMap map = new_map(options);
@@ -318,10 +325,12 @@ TEST(MapOptions, ThatMakeNoSenseAreRefusedByName) {
       {"clamp_max", [](MapOptions& o) { o.clamp_max = 1; }},
       {"occupancy_threshold", [](MapOptions& o) { o.occupancy_threshold = 0.05; }},
       {"free_margin_sigmas", [](MapOptions& o) { o.free_margin_sigmas = -1; }},
-      {"hit_max_sigma", [](MapOptions& o) { o.hit_max_sigma = -0.1; }},
+      {"free_hole", [](MapOptions& o) { o.free_hole = -0.1; }},
+      {"looks_baseline", [](MapOptions& o) { o.looks_baseline = std::nan(""); }},
+      {"hit_max_relative_sigma", [](MapOptions& o) { o.hit_max_relative_sigma = 0.6; }},
+      {"hit_near", [](MapOptions& o) { o.hit_near = -1; }},
       {"hit_min_share", [](MapOptions& o) { o.hit_min_share = 2; }},
       {"hit_min_of_peak", [](MapOptions& o) { o.hit_min_of_peak = 1.5; }},
-      {"free_min_known", [](MapOptions& o) { o.free_min_known = 0; }},
   };
   for (const auto& [name, spoil] : wrong) {
     MapOptions options;

@@ -266,11 +266,11 @@ std::string map_notes(const Report& report, const MapViews& views) {
   if (views.cut_off > 0)
     html += fmt::format(" {} scattered voxels lie outside the pictures.", grouped_text(views.cut_off));
   const auto options = nlohmann::ordered_json::parse(report.info.options, nullptr, false);
-  const auto sigma = nlohmann::ordered_json::json_pointer("/mapper/map/hit_max_sigma");
+  const auto sigma = nlohmann::ordered_json::json_pointer("/mapper/map/hit_max_relative_sigma");
   if (!options.is_discarded() && options.contains(sigma) && options.at(sigma).is_number()) {
     html += fmt::format(
-        " An obstacle whose depth has σ above {:g} m is not placed: what lies there stays unknown.",
-        options.at(sigma).get<double>());
+        " An obstacle whose depth has σ above {:g} % of it is not placed: what lies there stays unknown.",
+        100 * options.at(sigma).get<double>());
   }
   return html + "</p>\n";
 }

@@ -4,24 +4,41 @@
 #include <cmath>
 #include <limits>
 
+#include <opencv2/imgproc.hpp>
+
 #include "pade/mapping/back_projection.hpp"
 
 namespace pade::mapping {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// The bound per cell, at most the range, and never behind the depth; NaN where nothing is known.
+void bounded_ends(const DepthImage& image, double range, std::vector<float>& ends) {
+  const auto farthest = static_cast<float>(range);
+  float* end = ends.data();
+  for (int v = 0; v < image.depth.rows; ++v) {
+    const auto* depth = image.depth.ptr<float>(v);
+    const auto* bound = image.bound.ptr<float>(v);
+    for (int u = 0; u < image.depth.cols; ++u) {
+      const float before = depth[u] < bound[u] ? depth[u] : bound[u];  // NaN where the bound is
+      const float within = before > farthest ? farthest : before;
+      *end++ = within < 0 ? 0 : within;
+    }
+  }
+}
 
 /// Z - k sigma per cell, at most the range; NaN where nothing was measured.
-void free_ends(const DepthImage& image, const Clearance::Parameters& parameters, std::vector<float>& ends) {
-  const int width = image.depth.cols;
-  const int height = image.depth.rows;
-  ends.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), kUnknown);
-  for (int v = 0; v < height; ++v) {
+void measured_ends(const DepthImage& image, const Clearance::Parameters& parameters,
+                   std::vector<float>& ends) {
+  float* end = ends.data();
+  for (int v = 0; v < image.depth.rows; ++v, end += image.depth.cols) {
     const auto* depth = image.depth.ptr<float>(v);
     const auto* variance = image.variance.empty() ? nullptr : image.variance.ptr<float>(v);
     const auto* state = image.state.empty() ? nullptr : image.state.ptr<std::uint8_t>(v);
-    float* end = &ends[static_cast<std::size_t>(v) * static_cast<std::size_t>(width)];
-    for (int u = 0; u < width; ++u) {
+    for (int u = 0; u < image.depth.cols; ++u) {
+      end[u] = kUnknown;
       if (state != nullptr && state[u] != static_cast<std::uint8_t>(DepthState::measured)) continue;
       const double sigma = variance != nullptr ? std::sqrt(static_cast<double>(variance[u])) : 0.0;
       const double z = depth[u];
@@ -31,29 +48,23 @@ void free_ends(const DepthImage& image, const Clearance::Parameters& parameters,
   }
 }
 
-/// For each cell the nearest end within the 3 x 3 cells around it. `fill_only`: only cells that know nothing
-/// are given one, where most of their neighbours know something; the others keep their own.
-void nearest_of_neighbours(std::vector<float>& ends, std::vector<float>& out, int width, int height,
-                           bool fill_only) {
+/// For each cell that knows something the nearest end within the 3 x 3 cells around it.
+void nearest_of_neighbours(std::vector<float>& ends, std::vector<float>& out, int width, int height) {
   out = ends;
   const auto index = [width](int v, int u) {
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
   };
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
-      const bool known = !std::isnan(ends[index(v, u)]);
-      if (known == fill_only) continue;
-      float nearest = std::numeric_limits<float>::infinity();
-      int count = 0;
+      if (std::isnan(ends[index(v, u)])) continue;
+      float nearest = kInfinity;
       for (int y = std::max(v - 1, 0); y <= std::min(v + 1, height - 1); ++y) {
         for (int x = std::max(u - 1, 0); x <= std::min(u + 1, width - 1); ++x) {
           const float end = ends[index(y, x)];
-          if (std::isnan(end)) continue;
-          nearest = std::min(nearest, end);
-          ++count;
+          if (end < nearest) nearest = end;
         }
       }
-      if (known || count >= 5) out[index(v, u)] = nearest;
+      out[index(v, u)] = nearest;
     }
   }
   ends.swap(out);
@@ -71,12 +82,16 @@ void Clearance::set(const DepthImage& image, const Camera& camera, const Pose& T
 
   const int width = image.depth.cols;
   const int height = image.depth.rows;
-  free_ends(image, parameters, ends_);
+  ends_.resize(image.depth.total());
+  if (image.bound.empty()) {
+    measured_ends(image, parameters, ends_);
+  } else {
+    bounded_ends(image, parameters.range, ends_);
+  }
   // A window that straddles an edge has a depth between the two surfaces: its neighbours know the nearer one.
-  if (image.window > 1) nearest_of_neighbours(ends_, scratch_, width, height, false);
-  // Single pixels that failed among others that did not: without this, no large cube would ever be decided at
-  // once.
-  nearest_of_neighbours(ends_, scratch_, width, height, true);
+  if (image.window > 1) nearest_of_neighbours(ends_, scratch_, width, height);
+  close_holes(width, height);
+  drop_lone_ends(width, height);
   build_pyramid(width, height);
 
   Eigen::Matrix<double, 4, 3> normals;                   // inside where normal . point >= 0
@@ -91,17 +106,104 @@ void Clearance::set(const DepthImage& image, const Camera& camera, const Pose& T
   side_reach_ = 0.5 * (normals * R_camera_world_).cwiseAbs().rowwise().sum();
 }
 
+std::int32_t Clearance::hole_of(std::int32_t run) {
+  while (runs_[static_cast<std::size_t>(run)].hole != run) {
+    auto& up = runs_[static_cast<std::size_t>(run)].hole;
+    up = runs_[static_cast<std::size_t>(up)].hole;
+    run = up;
+  }
+  return run;
+}
+
+/// Rows of unknown cells, each joined to those of the row above that it touches.
+void Clearance::find_runs(int width, int height) {
+  runs_.clear();
+  std::size_t above = 0;  // the first run of the row above that may touch
+  for (int v = 0; v < height; ++v) {
+    const std::size_t begin = runs_.size();
+    const float* row = &ends_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width)];
+    for (int u = 0; u < width; ++u) {
+      if (!std::isnan(row[u])) continue;
+      const int first = u;
+      while (u < width && std::isnan(row[u])) ++u;
+      const auto run = static_cast<std::int32_t>(runs_.size());
+      runs_.push_back({v, first, u - 1, run});
+      while (above < begin && (runs_[above].row < v - 1 || runs_[above].last + 1 < first)) ++above;
+      for (std::size_t i = above; i < begin && runs_[i].first <= u; ++i) {
+        const std::int32_t a = hole_of(static_cast<std::int32_t>(i));
+        const std::int32_t b = hole_of(run);
+        runs_[static_cast<std::size_t>(std::max(a, b))].hole = std::min(a, b);
+      }
+    }
+    above = begin;
+  }
+}
+
+float Clearance::nearest_around(const Run& run, int width, int height) const {
+  float nearest = kInfinity;
+  for (int v = std::max(run.row - 1, 0); v <= std::min(run.row + 1, height - 1); ++v) {
+    const float* row = &ends_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width)];
+    for (int u = std::max(run.first - 1, 0); u <= std::min(run.last + 1, width - 1); ++u) {
+      if (row[u] < nearest) nearest = row[u];
+    }
+  }
+  return nearest;
+}
+
+/// A hole of n cells hides nothing larger than n Z / f at depth Z. Up to where that is `hole`, and to the
+/// nearest end around it, it counts as free; a hole at the border of the image may go on beyond it.
+void Clearance::close_holes(int width, int height) {
+  find_runs(width, height);
+  holes_.assign(runs_.size(), {width, 0, height, 0, kInfinity});
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+    hole = {std::min(hole.left, run.first), std::max(hole.right, run.last), std::min(hole.top, run.row),
+            std::max(hole.bottom, run.row), hole.nearest};
+  }
+  const double reach = parameters_.hole * std::min(camera_.fx, camera_.fy);
+  const auto free_to = [&](const Hole& hole) {
+    if (hole.left == 0 || hole.top == 0 || hole.right == width - 1 || hole.bottom == height - 1) return 0.0F;
+    const int size = std::max(hole.right - hole.left, hole.bottom - hole.top) + 1;
+    return static_cast<float>(reach / size);
+  };
+  constexpr float kTooNear = 0.2F;  // m: not worth the search around a large hole
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+    if (free_to(hole) > kTooNear)
+      hole.nearest = std::min(hole.nearest, nearest_around(runs_[i], width, height));
+  }
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    const Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+    const float end = free_to(hole) > kTooNear ? std::min(free_to(hole), hole.nearest) : 0.0F;
+    float* row = &ends_[static_cast<std::size_t>(run.row) * static_cast<std::size_t>(width)];
+    std::fill(row + run.first, row + run.last + 1, end);
+  }
+}
+
+/// Where every voxel within range covers 3 x 3 cells or more, a far end that no 3 x 3 cells around it share
+/// frees none of them. Without these, cubes that hold nothing free are told sooner; the answer for a voxel is
+/// the same, for each cell of what it covers lies in 3 x 3 cells of it.
+void Clearance::drop_lone_ends(int width, int height) {
+  if (parameters_.voxel * std::min(camera_.fx, camera_.fy) < 2 * parameters_.range) return;
+  const cv::Mat ends(height, width, CV_32FC1, ends_.data());
+  scratch_.resize(ends_.size());
+  cv::Mat opened(height, width, CV_32FC1, scratch_.data());
+  cv::morphologyEx(ends, opened, cv::MORPH_OPEN, cv::Mat());
+  ends_.swap(scratch_);
+}
+
 void Clearance::build_pyramid(int width, int height) {
-  constexpr Cell kNothing{std::numeric_limits<float>::infinity(), 0, 0};
+  constexpr Extremes kNothing{kInfinity, 0};
   std::size_t count = 1;
   for (int w = width, h = height; w > 1 || h > 1; w = (w + 1) / 2, h = (h + 1) / 2) ++count;
   levels_.resize(count);
 
-  Level& base = levels_[0];
-  base.width = width;
-  base.height = height;
-  base.cells.clear();
-  for (const float end : ends_) base.cells.push_back(std::isnan(end) ? kNothing : Cell{end, end, 1});
+  levels_[0].width = width;
+  levels_[0].height = height;
+  levels_[0].cells.clear();
+  for (const float end : ends_) levels_[0].cells.push_back({end, end});
   for (std::size_t level = 1; level < count; ++level) {
     const Level& fine = levels_[level - 1];
     Level& coarse = levels_[level];
@@ -110,13 +212,12 @@ void Clearance::build_pyramid(int width, int height) {
     coarse.cells.assign(static_cast<std::size_t>(coarse.width) * static_cast<std::size_t>(coarse.height),
                         kNothing);
     for (int v = 0; v < fine.height; ++v) {
-      const Cell* from = &fine.cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(fine.width)];
-      Cell* to = &coarse.cells[static_cast<std::size_t>(v / 2) * static_cast<std::size_t>(coarse.width)];
+      const Extremes* from = &fine.cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(fine.width)];
+      Extremes* to = &coarse.cells[static_cast<std::size_t>(v / 2) * static_cast<std::size_t>(coarse.width)];
       for (int u = 0; u < fine.width; ++u) {
-        Cell& cell = to[u / 2];
+        Extremes& cell = to[u / 2];
         cell.nearest = std::min(cell.nearest, from[u].nearest);
         cell.farthest = std::max(cell.farthest, from[u].farthest);
-        cell.known += from[u].known;
       }
     }
   }
@@ -124,7 +225,7 @@ void Clearance::build_pyramid(int width, int height) {
 
 /// Over the pixels u0..u1 x v0..v1, or a few more (whole cells of the level at which they are at most 4 x 4
 /// cells).
-Clearance::Seen Clearance::over(int u0, int v0, int u1, int v1) const {
+Clearance::Extremes Clearance::over(int u0, int v0, int u1, int v1) const {
   std::size_t level = 0;
   int extent = std::max(u1 - u0, v1 - v0);
   while (extent > 3 && level + 1 < levels_.size()) {
@@ -133,20 +234,16 @@ Clearance::Seen Clearance::over(int u0, int v0, int u1, int v1) const {
   }
   const Level& pyramid = levels_[level];
   const int shift = static_cast<int>(level);
-  Cell sum{std::numeric_limits<float>::infinity(), 0, 0};
+  Extremes both{kInfinity, 0};
   for (int v = v0 >> shift; v <= v1 >> shift; ++v) {
-    const Cell* row = &pyramid.cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(pyramid.width)];
+    const Extremes* row =
+        &pyramid.cells[static_cast<std::size_t>(v) * static_cast<std::size_t>(pyramid.width)];
     for (int u = u0 >> shift; u <= u1 >> shift; ++u) {
-      sum.nearest = std::min(sum.nearest, row[u].nearest);
-      sum.farthest = std::max(sum.farthest, row[u].farthest);
-      sum.known += row[u].known;
+      both.nearest = std::min(both.nearest, row[u].nearest);
+      both.farthest = std::max(both.farthest, row[u].farthest);
     }
   }
-  const auto pixels = [&](int first, int last, int size) {
-    return std::min(((last >> shift) + 1) << shift, size) - ((first >> shift) << shift);
-  };
-  const int total = pixels(u0, u1, levels_[0].width) * pixels(v0, v1, levels_[0].height);
-  return {sum.nearest, sum.farthest, static_cast<double>(sum.known) / total};
+  return both;
 }
 
 View Clearance::look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const {
@@ -175,14 +272,14 @@ View Clearance::look_at(const Eigen::Vector3d& centre, double side, bool is_voxe
   };
   // NOLINTEND(bugprone-incorrect-roundings)
   const Camera& c = camera_;
-  const Seen seen = over(
+  const Extremes seen = over(
       first(centre.x() - half.x(), c.fx, c.cx, c.width), first(centre.y() - half.y(), c.fy, c.cy, c.height),
       last(centre.x() + half.x(), c.fx, c.cx, c.width), last(centre.y() + half.y(), c.fy, c.cy, c.height));
   if (seen.farthest <= z_near) return View::nothing;
   const bool before_all = seen.nearest > z_far;
-  if (is_voxel) return before_all && seen.share >= parameters_.known_share ? View::free : View::nothing;
+  if (is_voxel) return before_all ? View::free : View::nothing;
   const bool whole = (inside - side * side_reach_).minCoeff() >= 0;
-  return before_all && whole && seen.share >= 1 ? View::free : View::partly;
+  return before_all && whole ? View::free : View::partly;
 }
 
 }  // namespace pade::mapping

@@ -20,13 +20,15 @@ enum class View {
   free,     ///< every point of it lies before what the pixels that look at it have measured
 };
 
-/// The free part of the viewing rays of one depth image, Z - k sigma, at most the range.
+/// The free part of the viewing rays of one depth image: up to the bound, or to Z - k sigma where the image
+/// has no bounds; at most the range.
 class Clearance {
  public:
   struct Parameters {
-    double range = 20;          ///< m along the optical axis
-    double margin_sigmas = 2;   ///< k
-    double known_share = 0.75;  ///< of the pixels that see a voxel, how many must have measured
+    double range = 20;         ///< m along the optical axis
+    double margin_sigmas = 2;  ///< k
+    double hole = 0.05;        ///< a thing that is smaller than this is not looked for in unknown pixels, m
+    double voxel = 0.1;        ///< side of the smallest cube that look_at() will be asked about, m
   };
 
   /// `image` as OccupancyMap::integrate() takes it. Buffers are kept from call to call.
@@ -38,6 +40,8 @@ class Clearance {
     return R_camera_world_ * (point - origin_);
   }
   [[nodiscard]] const Eigen::Matrix3d& R_camera_world() const { return R_camera_world_; }
+  /// Of the camera, in the world.
+  [[nodiscard]] const Eigen::Vector3d& origin() const { return origin_; }
 
   /// @param centre    of a cube along the axes of the world, in the camera's frame, metres
   /// @param side      metres
@@ -45,23 +49,32 @@ class Clearance {
   [[nodiscard]] View look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const;
 
  private:
-  struct Cell {
-    float nearest;       // of the known pixels, m; infinity where none is known
-    float farthest;      // 0 where none is known
-    std::int32_t known;  // pixels
+  struct Extremes {
+    float nearest;
+    float farthest;
   };
   struct Level {
     int width = 0;
     int height = 0;
-    std::vector<Cell> cells;
+    std::vector<Extremes> cells;
   };
-  struct Seen {
-    float nearest;
-    float farthest;
-    double share;  // of known pixels
+  /// Neighbouring cells of a row that know nothing.
+  struct Run {
+    int row, first, last;
+    std::int32_t hole;  // index of the run that stands for its hole: itself, or an earlier one
   };
+  /// Runs that touch, also at corners.
+  struct Hole {
+    int left, right, top, bottom;
+    float nearest;  // end of the cells around it
+  };
+  void close_holes(int width, int height);
+  void find_runs(int width, int height);
+  [[nodiscard]] std::int32_t hole_of(std::int32_t run);
+  [[nodiscard]] float nearest_around(const Run& run, int width, int height) const;
+  void drop_lone_ends(int width, int height);
   void build_pyramid(int width, int height);
-  [[nodiscard]] Seen over(int u0, int v0, int u1, int v1) const;
+  [[nodiscard]] Extremes over(int u0, int v0, int u1, int v1) const;
 
   Camera camera_;  // of the cells
   Parameters parameters_;
@@ -70,7 +83,9 @@ class Clearance {
   Eigen::Vector3d reach_;                     // half extents of a cube of side 1 along the axes of the camera
   Eigen::Vector4d side_x_, side_y_, side_z_;  // inward normals of the viewing frustum's sides, camera
   Eigen::Vector4d side_reach_;                // half extents of a cube of side 1 along them
-  std::vector<float> ends_, scratch_;         // Z - k sigma per cell
+  std::vector<float> ends_, scratch_;         // where the free part of each cell's ray ends; 0 = unknown
+  std::vector<Run> runs_;
+  std::vector<Hole> holes_;
   std::vector<Level> levels_;
 };
 

@@ -27,25 +27,102 @@ std::uint16_t gather(std::uint64_t x) {
 
 unsigned bits_below(unsigned depth) { return 3 * (kTreeDepth - depth); }
 
-/// Walks the octree from the top, all in the camera's frame.
-struct FreeSpaceSearch {
-  const Clearance& clearance;
-  std::vector<CellUpdate>& out;
-  std::array<Eigen::Vector3d, 8> to_child;  // from the centre of a cube of side 1 to those of its eighths
+std::size_t voxels_of(unsigned depth) { return std::size_t{1} << bits_below(depth); }
 
-  void visit(std::uint64_t code, const Eigen::Vector3d& centre, double side, unsigned depth) const {
-    const View view = clearance.look_at(centre, side, depth == kTreeDepth);
-    if (view == View::nothing) return;
-    if (view == View::free) {
-      out.push_back({code, depth, false});
-      return;
+/// Walks the octree from the top, all in the camera's frame.
+class FreeSpaceSearch {
+ public:
+  FreeSpaceSearch(const Clearance& now, std::span<const Clearance* const> earlier, bool alone, float change,
+                  std::vector<CellUpdate>& out)
+      : now_(now), alone_(alone), change_(change), out_(out) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      const Eigen::Vector3d corner((i & 1U) != 0 ? 1 : -1, (i & 2U) != 0 ? 1 : -1, (i & 4U) != 0 ? 1 : -1);
+      to_child_[i] = 0.25 * now.R_camera_world() * corner;
     }
-    if (depth == kTreeDepth) return;  // a voxel has no parts
-    for (std::uint64_t i = 0; i < 8; ++i) {
-      visit(code | i << bits_below(depth + 1), centre + side * to_child[i], 0.5 * side, depth + 1);
+    for (const Clearance* clearance : earlier) {
+      witnesses_.push_back({clearance, clearance->R_camera_world() * now.R_camera_world().transpose(),
+                            clearance->in_camera(now.origin())});
     }
   }
+
+  std::size_t search(double side) {
+    const auto all = static_cast<std::uint32_t>((std::uint64_t{1} << witnesses_.size()) - 1);
+    visit({0, now_.in_camera(Eigen::Vector3d::Zero()), side, 0}, View::partly, all);
+    return pending_;
+  }
+
+ private:
+  struct Witness {
+    const Clearance* clearance;
+    Eigen::Matrix3d R_witness_now;
+    Eigen::Vector3d t_witness_now;
+  };
+  struct Cube {
+    std::uint64_t code;
+    Eigen::Vector3d centre;  // in the camera's frame
+    double side;
+    unsigned depth;
+  };
+
+  /// What the witnesses in `open` say: free where one of them does. Those that know nothing leave `open`.
+  View ask(const Cube& cube, std::uint32_t& open) const {
+    for (std::size_t i = 0; i < witnesses_.size(); ++i) {
+      const std::uint32_t bit = std::uint32_t{1} << i;
+      if ((open & bit) == 0) continue;
+      const Witness& witness = witnesses_[i];
+      const View view = witness.clearance->look_at(
+          witness.R_witness_now * cube.centre + witness.t_witness_now, cube.side, cube.depth == kTreeDepth);
+      if (view == View::free) return View::free;
+      if (view == View::nothing) open &= ~bit;
+    }
+    return open == 0 ? View::nothing : View::partly;
+  }
+
+  /// @param seen  what is known already of the cube that this one is a part of
+  void visit(const Cube& cube, View seen, std::uint32_t open) {
+    if (seen != View::free) seen = now_.look_at(cube.centre, cube.side, cube.depth == kTreeDepth);
+    if (seen == View::nothing) return;
+    if (seen == View::free) {
+      const View confirmed = alone_ ? View::free : ask(cube, open);
+      if (confirmed == View::free) out_.push_back({cube.code, cube.depth, change_});
+      if (confirmed == View::nothing) pending_ += voxels_of(cube.depth);
+      if (confirmed != View::partly) return;
+    }
+    if (cube.depth == kTreeDepth) return;  // a voxel has no parts
+    for (std::uint64_t i = 0; i < 8; ++i) {
+      visit({cube.code | i << bits_below(cube.depth + 1), cube.centre + cube.side * to_child_[i],
+             0.5 * cube.side, cube.depth + 1},
+            seen, open);
+    }
+  }
+
+  const Clearance& now_;
+  bool alone_;
+  float change_;
+  std::vector<CellUpdate>& out_;
+  std::array<Eigen::Vector3d, 8> to_child_;  // from the centre of a cube of side 1 to those of its eighths
+  std::vector<Witness> witnesses_;
+  std::size_t pending_ = 0;
 };
+
+/// `hits` are those within `cell`.
+void cut_out_of(const CellUpdate& cell, std::span<const CellUpdate> hits, std::vector<CellUpdate>& out) {
+  if (hits.empty()) {
+    out.push_back(cell);
+    return;
+  }
+  if (cell.depth == kTreeDepth) return;
+  const unsigned below = bits_below(cell.depth + 1);
+  for (std::uint64_t i = 0; i < 8; ++i) {
+    const CellUpdate part{cell.code | i << below, cell.depth + 1, cell.change};
+    const auto end = std::find_if(hits.begin(), hits.end(), [&](const CellUpdate& hit) {
+      return hit.code >> below != part.code >> below;
+    });
+    const auto count = static_cast<std::size_t>(end - hits.begin());
+    cut_out_of(part, hits.first(count), out);
+    hits = hits.subspan(count);
+  }
+}
 
 }  // namespace
 
@@ -70,19 +147,21 @@ MapCell cell_of(std::uint64_t code, unsigned depth, double voxel) {
   return cell;
 }
 
-void HitCounter::add(const octomap::OcTreeKey& key) {
+void HitCounter::add(const octomap::OcTreeKey& key, std::uint32_t certainty) {
   if (last_ < hits_.size() && hits_[last_].key == key) {
     ++hits_[last_].count;
+    hits_[last_].certainty += certainty;
     return;
   }
   if (2 * hits_.size() >= slots_.size()) grow();
   const std::size_t slot = slot_of(key);
   if (slots_[slot] == 0) {
-    hits_.push_back({key, 0});
+    hits_.push_back({key, 0, 0});
     slots_[slot] = static_cast<std::uint32_t>(hits_.size());
   }
   last_ = slots_[slot] - 1;
   ++hits_[last_].count;
+  hits_[last_].certainty += certainty;
 }
 
 /// Where the voxel is, or the empty slot where it would be.
@@ -114,18 +193,25 @@ void HitCounter::grow() {
   hits_.clear();
   for (const Hit& hit : old) {
     last_ = hits_.size();
-    add(hit.key);
+    add(hit.key, hit.certainty);
     hits_.back().count = hit.count;
   }
 }
 
-void find_free_cells(const Clearance& clearance, double voxel, std::vector<CellUpdate>& out) {
-  FreeSpaceSearch search{clearance, out, {}};
-  for (std::size_t i = 0; i < 8; ++i) {
-    const Eigen::Vector3d corner((i & 1U) != 0 ? 1 : -1, (i & 2U) != 0 ? 1 : -1, (i & 4U) != 0 ? 1 : -1);
-    search.to_child[i] = 0.25 * clearance.R_camera_world() * corner;
+std::size_t find_free_cells(const Clearance& now, std::span<const Clearance* const> earlier, bool alone,
+                            double voxel, float change, std::vector<CellUpdate>& out) {
+  return FreeSpaceSearch(now, earlier, alone, change, out).search(2.0 * kTreeCentre * voxel);
+}
+
+void cut_out(std::span<const CellUpdate> cells, std::span<const CellUpdate> hits,
+             std::vector<CellUpdate>& out) {
+  auto hit = hits.begin();
+  for (const CellUpdate& cell : cells) {
+    while (hit != hits.end() && hit->code < cell.code) ++hit;
+    const auto first = hit;
+    while (hit != hits.end() && hit->code - cell.code < voxels_of(cell.depth)) ++hit;
+    cut_out_of(cell, {first, hit}, out);
   }
-  search.visit(0, clearance.in_camera(Eigen::Vector3d::Zero()), 2.0 * kTreeCentre * voxel, 0);
 }
 
 void UpdatableTree::apply(std::span<const CellUpdate> updates, MapChange& change) {
@@ -149,7 +235,9 @@ void UpdatableTree::apply_below(octomap::OcTreeNode* node, bool created, unsigne
   if (!created && !nodeHasChildren(node)) {
     // A cube of one state. Where it is sure already of what all updates say, there is nothing to do below it.
     const float value = node->getLogOdds();
-    const auto says = [](bool hit) { return [hit](const CellUpdate& update) { return update.hit == hit; }; };
+    const auto says = [](bool hit) {
+      return [hit](const CellUpdate& update) { return (update.change > 0) == hit; };
+    };
     if (value <= clamping_thres_min && std::all_of(updates.begin(), updates.end(), says(false))) return;
     if (value >= clamping_thres_max && std::all_of(updates.begin(), updates.end(), says(true))) return;
     expandNode(node);
@@ -177,14 +265,14 @@ void UpdatableTree::apply_to_all(octomap::OcTreeNode* node, bool created, unsign
       const bool is_new = !nodeChildExists(node, i);
       if (is_new) createNodeChild(node, i);
       const CellUpdate part{update.code | static_cast<std::uint64_t>(i) << bits_below(depth + 1), depth + 1,
-                            update.hit};
+                            update.change};
       apply_to_all(getNodeChild(node, i), is_new, depth + 1, part, change);
     }
     settle(node);
     return;
   }
   const bool was_occupied = !created && isNodeOccupied(node);
-  updateNodeLogOdds(node, update.hit ? prob_hit_log : prob_miss_log);
+  updateNodeLogOdds(node, update.change);
   const bool is_occupied = isNodeOccupied(node);
   if (!created && was_occupied == is_occupied) return;
   (is_occupied ? change.became_occupied : change.became_free)

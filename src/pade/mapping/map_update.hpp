@@ -24,17 +24,20 @@ octomap::OcTreeKey morton_key(std::uint64_t code);
 struct CellUpdate {
   std::uint64_t code = 0;  ///< Morton code of its lower corner
   unsigned depth = kTreeDepth;
-  bool hit = false;  ///< else a miss
+  float change = 0;  ///< of the log-odds: above 0 for a hit, below for a miss
 };
 
 /// Counts how often each voxel was hit. Open addressing; cleared at a cost proportional to what was used.
 class HitCounter {
  public:
+  static constexpr std::uint32_t kCertain = 256;
   struct Hit {
     octomap::OcTreeKey key;
     std::uint32_t count = 0;
+    std::uint32_t certainty = 0;  ///< sum over its points
   };
-  void add(const octomap::OcTreeKey& key);
+  /// @param certainty  probability that the point lies in this voxel, in units of 1 / kCertain
+  void add(const octomap::OcTreeKey& key, std::uint32_t certainty);
   void clear();
   /// How often a voxel was hit.
   [[nodiscard]] std::uint32_t count(const octomap::OcTreeKey& key) const;
@@ -49,8 +52,15 @@ class HitCounter {
   std::size_t last_ = 0;  // neighbouring pixels mostly hit the same voxel
 };
 
-/// Appends the free cubes that `clearance` shows, as large as they can be, in Morton order.
-void find_free_cells(const Clearance& clearance, double voxel, std::vector<CellUpdate>& out);
+/// Appends the free cubes that `now` shows and, unless `alone`, at least one of `earlier` shows too, as large
+/// as they can be, in Morton order, as misses of `change`. At most 32 earlier ones.
+/// @return voxels that `now` alone shows free; 0 where `alone`
+std::size_t find_free_cells(const Clearance& now, std::span<const Clearance* const> earlier, bool alone,
+                            double voxel, float change, std::vector<CellUpdate>& out);
+
+/// Appends `cells` without the voxels of `hits`, dividing cubes that hold some. All in Morton order.
+void cut_out(std::span<const CellUpdate> cells, std::span<const CellUpdate> hits,
+             std::vector<CellUpdate>& out);
 
 /// An octree to which many updates are applied in one pass: each inner node on the way is visited once.
 class UpdatableTree : public octomap::OcTree {

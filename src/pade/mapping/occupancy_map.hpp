@@ -30,10 +30,13 @@ struct MapOptions {
   double clamp_max = 0.971;
   double occupancy_threshold = 0.5;  ///< occupied at and above
   double free_margin_sigmas = 2;     ///< a ray is free up to Z - this many sigma
-  double hit_max_sigma = 0.2;        ///< depths less certain than this place no obstacle, m
-  double hit_min_share = 0.05;       ///< of the pixels that a voxel covers in the image, to count as hit
-  double hit_min_of_peak = 0.5;      ///< of the points of the fullest neighbour, to count as hit
-  double free_min_known = 0.75;  ///< of the pixels that a voxel covers, how many must have depth to clear it
+  double free_hole = 0.05;           ///< what is smaller is not looked for in pixels that know nothing, m
+  double looks_baseline = 0.1;  ///< between the places of the two looks that make a voxel free, and of those
+                                ///< that confirm a far or uncertain hit, m; 0 = one look is enough
+  double hit_max_relative_sigma = 0.25;  ///< depths with sigma above this share of Z place no obstacle
+  double hit_near = 8;                   ///< hits at this depth and beyond wait for a second look, m
+  double hit_min_share = 0.05;           ///< of the pixels that a voxel covers in the image, to count as hit
+  double hit_min_of_peak = 0.5;          ///< of the points of the fullest neighbour, to count as hit
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -45,11 +48,16 @@ struct MapOptions {
     field("clamp_max", self.clamp_max, "upper bound of the occupancy");
     field("occupancy_threshold", self.occupancy_threshold, "a voxel is occupied at and above");
     field("free_margin_sigmas", self.free_margin_sigmas, "k: a ray is free up to Z - k sigma");
-    field("hit_max_sigma", self.hit_max_sigma, "depths less certain than this place no obstacle, m");
+    field("free_hole", self.free_hole,
+          "what is smaller than this is not looked for in pixels that know nothing, m");
+    field("looks_baseline", self.looks_baseline,
+          "between two looks that make a voxel free or confirm a far or uncertain hit, m; 0 = one look is "
+          "enough");
+    field("hit_max_relative_sigma", self.hit_max_relative_sigma,
+          "depths with sigma above this share of Z place no obstacle");
+    field("hit_near", self.hit_near, "hits at this depth and beyond wait for a second look, m");
     field("hit_min_share", self.hit_min_share, "share of a voxel's pixels that make a hit");
     field("hit_min_of_peak", self.hit_min_of_peak, "share of the fullest neighbour's points that make a hit");
-    field("free_min_known", self.free_min_known,
-          "share of a voxel's pixels that must have depth to clear it");
   }
 };
 
@@ -70,6 +78,9 @@ struct MapChange {
   std::vector<MapCell> became_occupied;
   std::vector<MapCell> became_free;  ///< from unknown or from occupied
   std::size_t hits = 0;              ///< voxels that got a hit
+  std::size_t pending_hits = 0;      ///< voxels, of this image and earlier ones, that wait for another look
+  std::size_t pending_free = 0;  ///< voxels that this image shows free, and no earlier one from another place
+  std::size_t too_uncertain = 0;  ///< pixels whose sigma is above hit_max_relative_sigma
   std::size_t outside = 0;  ///< points beyond what the octree can address (32768 voxels from the origin)
 };
 
@@ -91,13 +102,16 @@ class OccupancyMap {
 
   /// Fuses one depth image. Each voxel gets at most one hit or one miss. Same images in the same order, same
   /// bits.
-  /// - Hit: the voxel holds the points of enough pixels with Z <= range and sigma <= hit_max_sigma: enough
-  /// for its
-  ///   size in the image, and not far fewer than the voxels before and behind it (which noise has spread
-  ///   there).
-  /// - Miss: every pixel that sees the voxel has measured, and Z - k sigma of all of them lies behind the
-  /// whole voxel. Pixels that are not `measured`, or whose depth or variance is NaN, change nothing.
-  /// @param image           variance empty = depth is exact; state empty = measured wherever there is depth
+  /// - Hit: the voxel holds the points of enough pixels with Z <= range and sigma <= hit_max_relative_sigma
+  /// Z: enough for its size in the image, and not far fewer than the voxels before and behind it. A hit
+  /// nearer than hit_near whose pixels' own sigma is no more than a voxel counts at once, others wait until
+  /// looks from other places agree.
+  /// - Miss: every pixel that sees the voxel has its bound (or, in an image without bounds, Z - k sigma)
+  /// behind the whole voxel, in this image and in one of the last few from at least looks_baseline away.
+  /// Pixels that know nothing leave what lies behind them unknown, but for holes that are smaller than
+  /// free_hole there.
+  /// @param image           variance empty = depth is exact; own_variance empty = variance; state empty =
+  /// measured wherever there is depth; bound empty = Z - k sigma of measured pixels
   /// @param camera          pinhole of the image at full size (its distortion is ignored)
   /// @param T_world_camera  metres; must be finite
   MapChange integrate(const DepthImage& image, const Camera& camera, const Pose& T_world_camera);
@@ -126,9 +140,17 @@ class OccupancyMap {
   struct Scratch;
   explicit OccupancyMap(const MapOptions& options);
   [[nodiscard]] const octomap::OcTreeNode* find(const Eigen::Vector3d& point) const;
-  [[nodiscard]] bool is_hit(const octomap::OcTreeKey& key, std::uint32_t count, const Camera& cells,
-                            const Pose& T_world_camera) const;
-  std::size_t find_hits(const DepthImage& image, const Camera& camera, const Pose& T_world_camera);
+  struct HitVoxel;
+  void count_points(const DepthImage& image, const Camera& cells, const Pose& T_world_camera,
+                    MapChange& change);
+  [[nodiscard]] bool is_hit(const HitVoxel& voxel) const;
+  void find_hits(const Camera& cells, const Pose& T_world_camera);
+  [[nodiscard]] bool is_on_the_peak(const HitVoxel& voxel, float weight) const;
+  [[nodiscard]] float believed(const HitVoxel& voxel);
+  void believe_hits(MapChange& change);
+  void find_free(MapChange& change);
+  void arrive_at(const Eigen::Vector3d& place);
+  void remember_view();
 
   MapOptions options_;
   std::unique_ptr<Tree> tree_;

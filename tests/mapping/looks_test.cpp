@@ -1,0 +1,268 @@
+// What bounds, the two parts of sigma and the number of looks mean for the map.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <utility>
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include "pade/mapping/occupancy_map.hpp"
+#include "pade/simulation/analytic_flights.hpp"
+
+#include "mapping/flown_map.hpp"
+
+namespace pade::mapping {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+const Camera kCamera = simulation::analytic_camera(160, 120);
+const Camera kLarge = simulation::analytic_camera(480, 360);
+
+/// A camera at (x, y, 1.53) that looks along the world's x, its optical axis inside of voxels.
+Pose level_at(double x, double y = 0.03) {
+  static const Pose level = simulation::make_analytic_flight("forward", 1)->T_world_camera[0];
+  Pose pose = level;
+  pose.translation = Vector3d(x, y, 1.53);
+  return pose;
+}
+
+OccupancyMap new_map(const MapOptions& options = {}) {
+  return std::move(OccupancyMap::create(options)).value();
+}
+
+DepthImage nothing_known(const Camera& camera = kCamera) {
+  DepthImage image;
+  image.depth = cv::Mat(camera.height, camera.width, CV_32FC1, cv::Scalar(kNaN));
+  image.variance = image.depth.clone();
+  image.own_variance = image.depth.clone();
+  image.bound = image.depth.clone();
+  image.state = cv::Mat(image.depth.size(), CV_8UC1, cv::Scalar(static_cast<int>(DepthState::no_texture)));
+  return image;
+}
+
+DepthImage bounded_to(double bound) {
+  DepthImage image = nothing_known();
+  image.bound.setTo(bound);
+  image.state.setTo(static_cast<int>(DepthState::low_parallax));
+  return image;
+}
+
+/// A wall across the optical axis, its depth with normal noise of standard deviation `own`, and `common` more
+/// that the variance states.
+DepthImage wall(double z, double own, double common, std::uint64_t seed = 1, const Camera& camera = kCamera) {
+  DepthImage image = nothing_known(camera);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  for (float& depth : cv::Mat_<float>(image.depth)) depth = static_cast<float>(z + own * normal(random));
+  image.own_variance.setTo(own * own);
+  image.variance.setTo(own * own + common * common);
+  image.bound.setTo(std::max(0.0, z - 2.5 * std::hypot(own, common)));
+  image.state.setTo(0);
+  return image;
+}
+
+std::size_t occupied(const OccupancyMap& map) { return map.counts().occupied; }
+
+TEST(TwoLooks, BoundsAloneClearACorridorAfterTwoPlacesAndNotAfterOne) {
+  const DepthImage image = bounded_to(10);
+  OccupancyMap map = new_map();
+  const MapChange first = map.integrate(image, kCamera, level_at(0));
+  EXPECT_GT(first.pending_free, 10000U);
+  for (int i = 0; i < 5; ++i) {
+    const MapChange again = map.integrate(image, kCamera, level_at(0.01 * i));
+    EXPECT_GT(again.pending_free, 10000U);
+  }
+  EXPECT_EQ(map.counts().free, 0U);
+  map.integrate(image, kCamera, level_at(0.1));
+  EXPECT_EQ(occupied(map), 0U);
+  for (double x = 1; x < 9.86; x += 0.1) EXPECT_EQ(map.at({x, 0.03, 1.53}), Occupancy::free) << x;
+  for (double x = 10.15; x < 20; x += 0.1) EXPECT_EQ(map.at({x, 0.03, 1.53}), Occupancy::unknown) << x;
+}
+
+TEST(TwoLooks, TheTwoNeedNotBeNeighboursInTime) {
+  OccupancyMap map = new_map();
+  map.integrate(bounded_to(10), kCamera, level_at(0));
+  map.integrate(nothing_known(), kCamera, level_at(0.2));
+  EXPECT_EQ(map.counts().free, 0U);
+  map.integrate(bounded_to(10), kCamera, level_at(0.4));
+  EXPECT_EQ(map.at({5, 0.03, 1.53}), Occupancy::free);
+}
+
+TEST(TwoLooks, OneOfAnotherPlaceThatSawAnObstacleConfirmsNothing) {
+  OccupancyMap map = new_map();
+  map.integrate(bounded_to(4), kCamera, level_at(0));
+  const MapChange change = map.integrate(bounded_to(10), kCamera, level_at(0.2));
+  EXPECT_EQ(map.at({3, 0.03, 1.53}), Occupancy::free);
+  EXPECT_EQ(map.at({6, 0.03, 1.53}), Occupancy::unknown);
+  EXPECT_GT(change.pending_free, 1000U);
+}
+
+TEST(Bounds, AThinPoleIsNeverClearedThrough) {
+  // A vertical line at (6, 0.08), 2 pixels wide, with a near bound or none, before a wall far behind it; one
+  // pixel in 50 of the rest knows nothing.
+  for (const bool is_known : {true, false}) {
+    OccupancyMap map = new_map();
+    std::mt19937_64 random(5);
+    for (int k = 0; k < 12; ++k) {
+      const Pose pose = level_at(0.4 * k, 0.03 + 0.04 * k);
+      DepthImage image = bounded_to(15);
+      for (float& bound : cv::Mat_<float>(image.bound)) {
+        if (random() % 200 == 0) bound = kNaN;
+      }
+      const Vector3d pole = pose.inverse() * Vector3d(6, 0.08, 1.53);
+      const auto column = static_cast<int>(kCamera.project(pole)->x());
+      image.bound.colRange(column, column + 2).setTo(is_known ? 0.97 * pole.z() : kNaN);
+      map.integrate(image, kCamera, pose);
+      for (double z = 0.5; z < 2.5; z += 0.02)
+        ASSERT_NE(map.at({6, 0.08, z}), Occupancy::free) << k << " " << z;
+    }
+    EXPECT_EQ(map.at({5.5, 0.45, 1.53}), Occupancy::free);
+    EXPECT_EQ(map.at({6.0, 0.75, 1.53}), Occupancy::free);
+  }
+}
+
+TEST(Bounds, AHoleHidesWhatIsBehindItOnlyWhereMoreThanFreeHoleFits) {
+  // A hole of n pixels leaves everything unknown behind free_hole f / n.
+  const double f = kCamera.fx;
+  for (const int n : {1, 2, 4}) {
+    MapOptions options;
+    options.looks_baseline = 0;
+    OccupancyMap map = new_map(options);
+    DepthImage image = bounded_to(18);
+    image.bound(cv::Rect(80, 60, n, n)).setTo(kNaN);
+    map.integrate(image, kCamera, level_at(0));
+    const double end = std::min(options.free_hole * f / n, 18.0);
+    const Vector3d ray = level_at(0).rotation * Vector3d((80 + 0.5 * (n - 1) - kCamera.cx) / f,
+                                                         (60 + 0.5 * (n - 1) - kCamera.cy) / f, 1);
+    for (double z = 0.5; z < 17.9; z += 0.05) {
+      const Occupancy state = map.at(level_at(0).translation + z * ray);
+      const bool is_between = z >= end - 0.2 && z <= end;  // within the voxel that the end divides
+      if (is_between) continue;
+      EXPECT_EQ(state, z < end ? Occupancy::free : Occupancy::unknown) << n << " at " << z;
+    }
+  }
+}
+
+TEST(Bounds, AHoleIsFilledWithTheNearestBoundAroundIt) {
+  MapOptions options;
+  options.looks_baseline = 0;
+  OccupancyMap map = new_map(options);
+  DepthImage image = bounded_to(15);
+  image.bound(cv::Rect(50, 30, 20, 60)).setTo(6);  // a thing with a hole at its edge
+  image.bound.at<float>(60, 70) = kNaN;
+  map.integrate(image, kCamera, level_at(0));
+  const Vector3d ray = level_at(0).rotation * Vector3d((70 - kCamera.cx) / kCamera.fx, 0.5 / kCamera.fx, 1);
+  EXPECT_EQ(map.at(level_at(0).translation + 5.0 * ray), Occupancy::free);
+  EXPECT_EQ(map.at(level_at(0).translation + 6.3 * ray), Occupancy::unknown);
+}
+
+TEST(Bounds, AHoleAtTheBorderMayGoOnBeyondIt) {
+  MapOptions options;
+  options.looks_baseline = 0;
+  OccupancyMap map = new_map(options);
+  DepthImage image = bounded_to(15);
+  image.bound.at<float>(60, 0) = kNaN;
+  map.integrate(image, kCamera, level_at(0));
+  const Vector3d ray = level_at(0).rotation * Vector3d(-kCamera.cx / kCamera.fx, 0.5 / kCamera.fx, 1);
+  for (double z = 0.5; z < 15; z += 0.1)
+    EXPECT_EQ(map.at(level_at(0).translation + z * ray), Occupancy::unknown) << z;
+}
+
+TEST(Bounds, AVoxelThatIsHitIsNotClearedByTheSameImage) {
+  // Bounds that contradict the depth.
+  MapOptions options;
+  options.looks_baseline = 0;
+  OccupancyMap map = new_map(options);
+  DepthImage image = wall(5.04, 0, 0);
+  image.bound.setTo(12);
+  map.integrate(image, kCamera, level_at(0));
+  EXPECT_EQ(map.at({5.04, 0.03, 1.53}), Occupancy::occupied);
+  EXPECT_EQ(map.at({4.5, 0.03, 1.53}), Occupancy::free);
+  EXPECT_EQ(map.at({5.2, 0.03, 1.53}), Occupancy::unknown);
+}
+
+TEST(Bounds, OneThatContradictsAnObstacleDoesNotClearIt) {
+  OccupancyMap map = new_map();
+  map.integrate(bounded_to(12), kCamera, level_at(0));
+  map.integrate(wall(5.04, 0, 0), kCamera, level_at(0.2));
+  const Vector3d point(5.24, 0.03, 1.53);
+  ASSERT_EQ(map.at(point), Occupancy::occupied);
+  map.integrate(bounded_to(12), kCamera, level_at(0.4));
+  EXPECT_EQ(map.at(point), Occupancy::occupied);
+  for (int k = 3; k < 8; ++k) map.integrate(bounded_to(12), kCamera, level_at(0.2 * k));
+  EXPECT_EQ(map.at(point), Occupancy::free);
+}
+
+TEST(Hits, ANearGoodOneIsAnObstacleAtOnceAndAFarOneWaitsForAnotherPlace) {
+  OccupancyMap near = new_map();
+  near.integrate(wall(5.04, 0.02, 0), kCamera, level_at(0));
+  EXPECT_GT(occupied(near), 500U);
+
+  OccupancyMap far = new_map();
+  for (int i = 0; i < 4; ++i) {
+    const MapChange change = far.integrate(wall(12.04, 0.02, 0), kCamera, level_at(0));
+    EXPECT_EQ(occupied(far), 0U);
+    EXPECT_GT(change.pending_hits, 2000U);
+  }
+  far.integrate(wall(11.94, 0.02, 0), kCamera, level_at(0.1));
+  EXPECT_GT(occupied(far), 2000U);
+}
+
+TEST(Hits, ASigmaThatIsCommonToTheImageMovesTheSurfaceAndDoesNotRemoveIt) {
+  OccupancyMap map = new_map();
+  for (int k = 0; k < 4; ++k)
+    map.integrate(wall(10.04 - 0.2 * k, 0.02, 0.5, 1, kLarge), kLarge, level_at(0.2 * k));
+  EXPECT_EQ(map.at({10.04, 0.03, 1.53}), Occupancy::occupied);
+  EXPECT_GT(occupied(map), 4000U);
+}
+
+TEST(Hits, UncertainOnesAddUpToASurfaceWhereItIs) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    OccupancyMap map = new_map();
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    map.integrate(wall(6.04, 0.3, 0, seed, kLarge), kLarge, level_at(0));
+    EXPECT_EQ(occupied(map), 0U);
+    for (std::uint64_t k = 1; k < 9; ++k) {
+      const double x = 0.2 * static_cast<double>(k);
+      map.integrate(wall(6.04 - x, 0.3, 0, 100 * seed + k, kLarge), kLarge, level_at(x));
+    }
+    std::size_t near = 0;
+    for (const MapCell& cell : map.occupied()) near += std::abs(cell.centre.x() - 6.04) < 0.3 ? 1 : 0;
+    EXPECT_GT(near, 800U);
+    EXPECT_GT(static_cast<double>(near), 0.92 * static_cast<double>(occupied(map)));
+  }
+}
+
+TEST(Hits, ADepthThatIsLessCertainThanTheRelativeLimitIsCountedAndPlacesNothing) {
+  OccupancyMap map = new_map();
+  for (int k = 0; k < 5; ++k) {
+    const MapChange change = map.integrate(wall(5, 0.1, 1.5), kCamera, level_at(0.2 * k));
+    EXPECT_EQ(change.too_uncertain, static_cast<std::size_t>(kCamera.width) * kCamera.height);
+    EXPECT_EQ(change.pending_hits, 0U);
+  }
+  EXPECT_EQ(occupied(map), 0U);
+}
+
+TEST(Hits, ThoseThatWaitAreForgottenBehindTheVehicle) {
+  // Walls that are never at the same place again, over 30 m.
+  OccupancyMap map = new_map();
+  std::size_t most_early = 0;
+  std::size_t most_late = 0;
+  for (int k = 0; k < 60; ++k) {
+    const DepthImage image = wall(9 + 1.3 * (k % 7), 0.02, 0);
+    const std::size_t waiting = map.integrate(image, kCamera, level_at(0.5 * k)).pending_hits;
+    auto& most = k < 40 ? most_early : most_late;
+    most = std::max(most, waiting);
+  }
+  EXPECT_GT(most_early, 10000U);
+  EXPECT_LE(most_late, most_early * 11 / 10);
+}
+
+}  // namespace
+}  // namespace pade::mapping
