@@ -278,15 +278,16 @@ std::string map_notes(const Report& report, const MapViews& views) {
 std::string map_section(const Report& report) {
   std::string html = "<h2>Map</h2>\n";
   const auto scene = scene_of(report);
-  if (!report.info.map || report.info.map->occupied_voxels == 0)
-    html += "<p class=\"soft\">Nothing is occupied.</p>\n";
+  const bool obstacles = report.info.map && report.info.map->occupied_voxels > 0;
+  if (!obstacles) html += "<p class=\"soft\">Nothing is occupied.</p>\n";
   const MapViews views = scene ? draw_map(*scene) : MapViews();
   if (views.top.empty()) return html;
   html += fmt::format("<div class=\"{}\">\n", views.wide ? "wide" : "views");
-  html += figure_of("all obstacles from above, in the colours of their heights", views.top);
+  if (obstacles) html += figure_of("all obstacles from above, in the colours of their heights", views.top);
   html += figure_of("free, occupied and unknown from above, at the height of the flight", views.level);
   html += "</div>\n<div class=\"wide\">\n";
-  html += figure_of("all obstacles from the side" + stretch_text(views.side_stretch), views.side);
+  if (obstacles)
+    html += figure_of("all obstacles from the side" + stretch_text(views.side_stretch), views.side);
   html += figure_of("free, occupied and unknown on the upright surface through the path and straight ahead" +
                         stretch_text(views.section_stretch),
                     views.section);
