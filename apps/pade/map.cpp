@@ -35,14 +35,14 @@ struct MapArguments {
   bool no_report = false;
   int threads = 1;
 
-  std::optional<std::string> flow, poses, calibration, world_up;
+  std::optional<std::string> flow, poses, calibration, world_up, refine_motion;
   std::optional<depth::Method> method;
   std::optional<depth::Model> model;
   std::optional<depth::Reading> reading;
   std::optional<depth::Derotation> derotate;
   std::optional<depth::Gates> gates;
   std::optional<Order> order;
-  std::optional<int> window, step;
+  std::optional<int> window, step, longest_step;
   std::optional<double> range, voxel, map_range;
   std::optional<navigation::ImuClass> imu;
 };
@@ -72,6 +72,8 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(mapper.derotation, arguments.derotate);
   set(mapper.order, arguments.order);
   set(mapper.step, arguments.step);
+  set(mapper.longest_step, arguments.longest_step);
+  if (arguments.refine_motion) mapper.refinement.on = *arguments.refine_motion == "on";
   set(mapper.map.voxel, arguments.voxel);
   set(mapper.map.range, arguments.map_range);
   set(options.sequence.poses, arguments.poses);
@@ -164,7 +166,7 @@ void run(const MapArguments& arguments, Context& context) {
 void add_pipeline_options(CLI::App& map, MapArguments& a) {
   std::vector<std::string> methods = flow::flow_estimator_names();
   methods.emplace_back("dis");
-  map.add_option("--flow", a.flow, "optical-flow method; dis = dis-medium (the default)")
+  map.add_option("--flow", a.flow, "optical-flow method (default clg-fast); dis = dis-medium")
       ->check(CLI::IsMember(methods));
   add_enum(map, "--depth", a.method,
            "depth from the pose (pade, the default) or from time to collision (ttc)");
@@ -180,6 +182,13 @@ void add_pipeline_options(CLI::App& map, MapArguments& a) {
       ->check(CLI::Range(1, 1024));
   map.add_option("--step", a.step, "pair each frame with the k-th before it (default 1)")
       ->check(CLI::Range(1, 1000));
+  map.add_option(
+         "--longest-step", a.longest_step,
+         "pair it also with one up to the k-th before it, for precision (default 4; 1: one pair only)")
+      ->check(CLI::Range(1, 1000));
+  map.add_option("--refine-motion", a.refine_motion,
+                 "on (default): the images refine rotation and direction of motions that are not exact; off")
+      ->check(CLI::IsMember({"on", "off"}));
   map.add_option("--range", a.range, "farthest depth that is published, m (default 20)")
       ->check(CLI::PositiveNumber);
   map.add_option("--voxel", a.voxel, "side of the map's voxels, m (default 0.1)")->check(CLI::PositiveNumber);

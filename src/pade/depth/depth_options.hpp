@@ -54,7 +54,7 @@ struct DepthOptions {
   double residual_angle = 0.25;
   double texture_gate = 3;
   double texture_correlation = 0.5;
-  double bound_sigmas = 3;
+  double bound_sigmas = 4;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -92,7 +92,7 @@ struct DepthOptions {
 inline DepthOptions chain_options() {
   DepthOptions options;
   options.flow_sigma_scale = 1.3;
-  options.flow_relative_sigma = 0.01;
+  options.flow_relative_sigma = 0.004;
   return options;
 }
 

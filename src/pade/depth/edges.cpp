@@ -17,7 +17,7 @@ void guard_edges(DepthImage& image, const EdgeOptions& options) {
       cv::getStructuringElement(cv::MORPH_RECT, {2 * options.radius + 1, 2 * options.radius + 1});
   const auto nearest_of = [&](const cv::Mat& values) {
     cv::Mat nearest = values.clone();
-    nearest.setTo(infinity, unknown | (values != values));
+    nearest.setTo(infinity, unknown | ~cv::Mat(values == values));
     cv::erode(nearest, nearest, square, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(infinity));
     return nearest;
   };

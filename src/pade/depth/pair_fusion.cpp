@@ -33,6 +33,9 @@ bool agree(float z1, float variance1, float z2, float variance2) {
          difference * std::min(z1, z2) <= kAgreement;
 }
 
+/// NaN where either says nothing.
+float nearer(float a, float b) { return std::isnan(a) || std::isnan(b) ? a + b : std::min(a, b); }
+
 }  // namespace
 
 void fuse_pairs(const DepthImage& shorter, DepthImage& longer) {
@@ -48,14 +51,23 @@ void fuse_pairs(const DepthImage& shorter, DepthImage& longer) {
         if (agree(s.depth[u], s.own_variance[u], l.depth[u], l.own_variance[u])) continue;
         l.state[u] = static_cast<std::uint8_t>(DepthState::inconsistent);
         l.depth[u] = l.variance[u] = l.own_variance[u] = nan;
-        l.bound[u] = std::min(s.bound[u], l.bound[u]);
+        l.bound[u] = nearer(s.bound[u], l.bound[u]);
       } else if (has_short) {
         l.state[u] = s.state[u];
         l.depth[u] = s.depth[u];
         l.variance[u] = s.variance[u];
         l.own_variance[u] = s.own_variance[u];
         l.bound[u] = s.bound[u];
-      } else if (!has_long && (std::isnan(l.bound[u]) || s.bound[u] > l.bound[u])) {
+      } else if (has_long) {
+        // What the shorter baseline contradicts, or could not see, started from a guess.
+        const bool contradicted = s.state[u] == static_cast<std::uint8_t>(DepthState::inconsistent) ||
+                                  s.state[u] == static_cast<std::uint8_t>(DepthState::out_of_view) ||
+                                  l.depth[u] < s.bound[u];
+        if (!contradicted) continue;
+        l.state[u] = static_cast<std::uint8_t>(DepthState::inconsistent);
+        l.depth[u] = l.variance[u] = l.own_variance[u] = nan;
+        l.bound[u] = nearer(s.bound[u], l.bound[u]);
+      } else if (std::isnan(l.bound[u]) || s.bound[u] > l.bound[u]) {
         l.state[u] = s.state[u];
         l.bound[u] = s.bound[u];
       }

@@ -58,6 +58,20 @@ cv::Mat predict_flow(const cv::Mat& flow, const Camera& camera, const RelativeMo
   return out;
 }
 
+cv::Mat filled_depth(const cv::Mat& depth) {
+  constexpr int kReach = 31;                         // px
+  const cv::Mat unknown = ~cv::Mat(depth == depth);  // NaN != NaN is false in OpenCV
+  cv::Mat rho = 1 / depth;
+  rho.setTo(0, unknown);
+  cv::Mat known(depth.size(), CV_32FC1, cv::Scalar(1));
+  known.setTo(0, unknown);
+  cv::boxFilter(rho, rho, CV_32F, {kReach, kReach}, {-1, -1}, false, cv::BORDER_CONSTANT);
+  cv::boxFilter(known, known, CV_32F, {kReach, kReach}, {-1, -1}, false, cv::BORDER_CONSTANT);
+  cv::Mat filled = depth.clone();
+  cv::Mat(known / rho).copyTo(filled, unknown & (known > 0.5F));
+  return filled;
+}
+
 cv::Mat flow_of_depth(const cv::Mat& depth, const Camera& camera, const RelativeMotion& motion) {
   const Reach a(camera, motion.t_reference_other);
   const auto cx = static_cast<float>(camera.cx);

@@ -20,6 +20,10 @@ namespace pade::depth {
 cv::Mat predict_flow(const cv::Mat& flow, const Camera& camera, const RelativeMotion& from,
                      const RelativeMotion& to);
 
+/// A guess where nothing is known: the mean of 1/Z over the known of the 31 x 31 pixels around.
+/// @param depth  CV_32FC1, m; NaN = none. @return the same with its holes filled; NaN where all around is one
+cv::Mat filled_depth(const cv::Mat& depth);
+
 /// Derotated flow that a depth image of the reference foretells for a pair: D = a / (Z - t_z).
 /// @param depth  CV_32FC1, m; NaN = none. @return as predict_flow().
 cv::Mat flow_of_depth(const cv::Mat& depth, const Camera& camera, const RelativeMotion& motion);

@@ -95,8 +95,8 @@ Reason why_unmeasured(const RunInfo& info) {
 Reason why_uncertain(const RunInfo& info) {
   const io::MotionSummary& motion = info.motion;
   if (motion.rotation_sigma > 0 || motion.direction_sigma > 0) {
-    const auto refined = option(info, "/mapper/refine_motion");
-    const bool off = refined && (*refined == false || *refined == "off");
+    const auto refined = option(info, "/mapper/refinement/on");
+    const bool off = refined && *refined == false;
     return {
         fmt::format("the motion between frames is known to {:.2g}° in rotation and {:.2g}° in direction "
                     "only (1 σ, median), over {:.3g} cm",

@@ -29,12 +29,19 @@ enum class FlowConfidence {
   forward_backward,  ///< and the error of the flow there and back, for twice the time
 };
 
+/// What a given initial flow is to the search.
+enum class InitialFlow {
+  replaces,  ///< what coarser levels would find: they are left out
+  competes,  ///< pixel by pixel, with what coarser levels have found: what matches the images better is kept
+};
+
 /// Options of all our own methods.
 struct FlowOptions {
   int smallest_level = 8;
   bool half_resolution = false;
   FlowConfidence confidence = FlowConfidence::none;
   int initial_level = 16;
+  InitialFlow initial = InitialFlow::replaces;
   int threads = 1;
 
   template <class Self, class Visitor>
@@ -49,6 +56,8 @@ struct FlowOptions {
           "coarsest pyramid level at which a given initial flow is taken up, 0 = full size: a good one, "
           "taken up "
           "on a fine level, finds thin things that move farther than they are wide");
+    field("initial", self.initial,
+          "replaces | competes: whether coarser levels are left out, or what they find is compared with it");
     field("threads", self.threads, "threads for one pair; the result does not depend on it");
   }
 };
@@ -112,6 +121,13 @@ FlowField estimate_region(FlowEstimator& method, const cv::Mat& first, const cv:
 
 }  // namespace pade::flow
 
+template <>
+struct pade::EnumNames<pade::flow::InitialFlow> {
+  static constexpr std::array names = {
+      std::pair{pade::flow::InitialFlow::replaces, std::string_view("replaces")},
+      std::pair{pade::flow::InitialFlow::competes, std::string_view("competes")},
+  };
+};
 template <>
 struct pade::EnumNames<pade::flow::FlowConfidence> {
   static constexpr std::array names = {

@@ -1,6 +1,7 @@
 #include "pade/flow/pyramid_flow.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -21,6 +22,38 @@ constexpr long kSmallestArea = 4096;
 constexpr double kSigmaWindow = 2.5;
 constexpr int kSigmaRadius = 5;
 constexpr float kGreyNoise = 1.0F;
+
+/// Sum of absolute differences of 5 x 5 pixels about (x, y) and their matches; infinity where the match of
+/// the centre leaves the image.
+float mismatch(const PlaneView& first, const PlaneView& second, int x, int y, float u, float v) {
+  constexpr int kRadius = 2;
+  const float left = static_cast<float>(x) + u;
+  const float top = static_cast<float>(y) + v;
+  const bool inside = left >= 0 && top >= 0 && left <= static_cast<float>(second.width - 1) &&
+                      top <= static_cast<float>(second.height - 1);  // false for NaN
+  if (!inside) return std::numeric_limits<float>::infinity();
+  const auto x0 = static_cast<int>(left);
+  const auto y0 = static_cast<int>(top);
+  const float fx = left - static_cast<float>(x0);
+  const float fy = top - static_cast<float>(y0);
+  const auto column = [&](int i, const PlaneView& plane) { return std::clamp(i, 0, plane.width - 1); };
+  const auto row = [&](int i, const PlaneView& plane) {
+    return plane.row(std::clamp(i, 0, plane.height - 1));
+  };
+  float sum = 0;
+  for (int dy = -kRadius; dy <= kRadius; ++dy) {
+    const float* const here = row(y + dy, first);
+    const float* const p = row(y0 + dy, second);
+    const float* const q = row(y0 + dy + 1, second);
+    for (int dx = -kRadius; dx <= kRadius; ++dx) {
+      const int a = column(x0 + dx, second);
+      const int b = column(x0 + dx + 1, second);
+      const float match = (1 - fy) * ((1 - fx) * p[a] + fx * p[b]) + fy * ((1 - fx) * q[a] + fx * q[b]);
+      sum += std::abs(match - here[column(x + dx, first)]);
+    }
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -87,9 +120,12 @@ FlowField PyramidFlow::run(int from, int to, const cv::Mat& initial) {
 void PyramidFlow::coarse_to_fine(int from, int to, const cv::Mat& initial) {
   const bool given =
       initial.size() == cv::Size(image(0, 0).width, image(0, 0).height) && initial.type() == CV_32FC2;
-  coarsest_ = given ? std::clamp(options_.initial_level, finest_level(), count_ - 1) : count_ - 1;
+  const int taken_up = std::clamp(options_.initial_level, finest_level(), count_ - 1);
+  const bool competes = given && options_.initial == InitialFlow::competes && taken_up < count_ - 1;
+  coarsest_ = given && !competes ? taken_up : count_ - 1;
   for (int level = coarsest_; level >= finest_level(); --level) {
-    start(level, given ? initial : cv::Mat());
+    start(level, given && !competes ? initial : cv::Mat());
+    if (competes && level == taken_up) take_up(initial, level, from, to);
     refine(level, from, to, flow_);
   }
   if (finest_level() > 0) start(0, initial);
@@ -170,6 +206,25 @@ void PyramidFlow::start(int level, const cv::Mat& initial) {
     PADE_DISPATCH(upsample, isa_)(flow_.v.view(), spare_.v.view(), 2, first, last);
   });
   std::swap(flow_, spare_);
+}
+
+// Each pixel keeps what matches its surroundings better: the flow it has, or the given one.
+void PyramidFlow::take_up(const cv::Mat& initial, int level, int from, int to) {
+  load_flow(initial, level, spare_);
+  const PlaneView& first = image(from, level);
+  const PlaneView& second = image(to, level);
+  for (int y = 0; y < first.height; ++y) {
+    float* const u = flow_.u.row(y);
+    float* const v = flow_.v.row(y);
+    for (int x = 0; x < first.width; ++x) {
+      const float given_u = spare_.u.row(y)[x];
+      const float given_v = spare_.v.row(y)[x];
+      if (mismatch(first, second, x, y, given_u, given_v) >= mismatch(first, second, x, y, u[x], v[x]))
+        continue;
+      u[x] = given_u;
+      v[x] = given_v;
+    }
+  }
 }
 
 std::vector<int> PyramidFlow::strip_borders(const PlaneView& plane, int smallest) const {

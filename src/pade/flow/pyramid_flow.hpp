@@ -57,6 +57,7 @@ class PyramidFlow : public FlowEstimator {
   FlowField run(int from, int to, const cv::Mat& initial);
   void coarse_to_fine(int from, int to, const cv::Mat& initial);
   void start(int level, const cv::Mat& initial);
+  void take_up(const cv::Mat& initial, int level, int from, int to);
   cv::Mat sigma(int from, int to);
   void build_mask();
 

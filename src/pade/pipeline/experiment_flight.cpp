@@ -90,7 +90,7 @@ std::optional<Job> flight_job(const PlanOptions& options, const std::vector<std:
   if (sequences.empty() || std::find(tables.begin(), tables.end(), "figure4") == tables.end())
     return std::nullopt;
   const auto approach = std::find(sequences.begin(), sequences.end(), "approach");
-  const ObstacleMapperOptions mapper;
+  const ObstacleMapperOptions mapper = one_pair();
   Job job;
   job.table = "figure4";
   job.sequence = approach == sequences.end() ? sequences.front() : *approach;
@@ -106,7 +106,7 @@ std::optional<Job> flight_job(const PlanOptions& options, const std::vector<std:
 
 Result<std::string> run_flight(const Job& job, const io::Sequence& sequence,
                                const std::function<bool()>& go_on) {
-  ObstacleMapperOptions options;
+  ObstacleMapperOptions options = one_pair();
   options.flow = job.flow;
   options.derotation = job.derotation;
   options.order = job.order;

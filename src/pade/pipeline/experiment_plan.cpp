@@ -194,7 +194,7 @@ const std::vector<ErratumRow>& errata_rows() {
 MethodOptions method_options(std::string_view method, double range) {
   MethodOptions out;
   const bool exact = method == pade_exact || method == ttc_exact;
-  const ObstacleMapperOptions mapper = exact ? ObstacleMapperOptions{} : as_printed();
+  const ObstacleMapperOptions mapper = exact ? one_pair() : as_printed();
   out.depth = mapper.depth;
   out.derotation = mapper.derotation;
   out.order = mapper.order;

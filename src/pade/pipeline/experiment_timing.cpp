@@ -95,7 +95,7 @@ class Clock {
  private:
   /// What the map costs hardly depends on the flow: once per sequence is enough.
   [[nodiscard]] bool maps() const {
-    return job_.flow == ObstacleMapperOptions().flow && job_.cells.back().name == pade_exact;
+    return job_.flow == as_printed().flow && job_.cells.back().name == pade_exact;
   }
 
   const Job& job_;

@@ -87,23 +87,31 @@ Matrix6d over_several(const RelativeMotion& one, int n) {
   return sum;
 }
 
-/// Flow over the longer baseline starts near its end: there it is taken up at half size.
-flow::FlowOptions flow_options(bool given_start) {
+/// Of a flow whose start is taken up at `level` at the coarsest.
+flow::FlowOptions flow_options(int level, flow::InitialFlow initial) {
   flow::FlowOptions options;
+  options.initial = initial;
   options.confidence = flow::FlowConfidence::local;
-  if (given_start) options.initial_level = 1;
+  options.initial_level = level;
   return options;
 }
+constexpr int kGuidedLevel = 1;  // flow over the longer baseline starts near its end
 
 }  // namespace
 
-ObstacleMapperOptions as_printed(ObstacleMapperOptions options) {
-  options.flow = "dis-medium";
+ObstacleMapperOptions one_pair(ObstacleMapperOptions options) {
   options.longest_step = 1;
+  options.prior_level = -1;
   options.refinement.on = false;
   options.edges.radius = 0;
   options.depth.flow_sigma_scale = 1;
   options.depth.flow_relative_sigma = 0;
+  return options;
+}
+
+ObstacleMapperOptions as_printed(ObstacleMapperOptions options) {
+  options = one_pair(std::move(options));
+  options.flow = "dis-medium";
   options.depth.model = depth::Model::instantaneous;
   options.depth.reading = depth::Reading::samelson;
   options.derotation = depth::Derotation::flow;
@@ -116,9 +124,11 @@ Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const Obstac
                                               const cv::Mat& valid) {
   if (const Status status = check(camera, options, valid); !status) return status.error();
   const bool two = options.longest_step > options.step;
-  auto flow = flow::make_flow_estimator(options.flow, flow_options(two));
+  const flow::FlowOptions first = flow_options(options.prior_level, flow::InitialFlow::competes);
+  auto flow = flow::make_flow_estimator(
+      options.flow, two ? flow_options(kGuidedLevel, flow::InitialFlow::replaces) : first);
   if (!flow) return flow.error();
-  auto first_flow = flow::make_flow_estimator(options.first_flow, flow_options(false));
+  auto first_flow = flow::make_flow_estimator(options.first_flow, first);
   if (!first_flow) return first_flow.error();
   auto map = mapping::OccupancyMap::create(options.map);
   if (!map) return map.error();
@@ -210,7 +220,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
       motion_between(older.given, newest.given, seconds_between(older.frame.time, newest.frame.time),
                      newest.frame.motion_covariance, options_.step, options_.order);
   Pair pair = match(reference, newest_is_reference ? older.frame : newest.frame, prior,
-                    two ? *first_flow_ : *flow_, {});
+                    two ? *first_flow_ : *flow_, foretold_flow(prior));
   refine(pair, reference);
   place(newest, older);
 
@@ -247,6 +257,18 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   // Back-project and update the occupancy map (Section 4.2).
   const Stopwatch watch(update_, Stage::map);
   update_.change = map_.integrate(update_.depth, camera_, reference.T_world_camera);
+}
+
+/// What the last depth image foretells of the flow; empty where there is none to ask.
+cv::Mat ObstacleMapper::foretold_flow(const RelativeMotion& motion) const {
+  const bool asks = options_.prior_level >= 0 && options_.order == Order::newest && options_.step == 1 &&
+                    options_.derotation == depth::Derotation::image && options_.depth.window == 1;
+  if (!asks || update_.depth.empty() || update_.depth.time != recent_.back().frame.time) return {};
+  const Pose T_newest_last{Eigen::Quaterniond(motion.R_reference_other).normalized(),
+                           motion.t_reference_other};
+  const cv::Mat depth =
+      depth::filled_depth(depth::reproject_depth(update_.depth.depth, camera_, T_newest_last));
+  return depth::flow_of_depth(depth, camera_, motion);
 }
 
 /// Removes the rotation, so that flow is parallax alone, and calculates it.

@@ -41,6 +41,7 @@ struct ObstacleMapperOptions {
   Order order = Order::newest;
   int step = 1;
   int longest_step = 4;
+  int prior_level = 3;
   double largest_parallax = 40;
   depth::MotionRefinementOptions refinement;
   depth::DepthOptions depth = depth::chain_options();
@@ -57,6 +58,9 @@ struct ObstacleMapperOptions {
     field("step", self.step, "pairs each frame with the step-th before it");
     field("longest_step", self.longest_step,
           "then with one up to this many frames before it, for precision; up to step = one pair only");
+    field("prior_level", self.prior_level,
+          "coarsest pyramid level at which the first flow takes up what the last depth image foretells; "
+          "-1 = it starts from nothing");
     field("largest_parallax", self.largest_parallax,
           "the longest baseline is one over which four fifths of the image move less, px");
     field("refinement", self.refinement, "motion refined by the images");
@@ -65,6 +69,10 @@ struct ObstacleMapperOptions {
     field("map", self.map, "occupancy map");
   }
 };
+
+/// One pair of frames as it is: one baseline, the motion as given, sigma as measured in the image, edges as
+/// the flow has them. What the paper's experiments compare.
+ObstacleMapperOptions one_pair(ObstacleMapperOptions options = {});
 
 /// The paper as it is printed ("literal PADE" of docs/method.md): instantaneous motion, Samelson inverse,
 /// flow derotated by B omega, depth on the first frame, 4 x 4 windows.
@@ -150,6 +158,7 @@ class ObstacleMapper {
   [[nodiscard]] bool two_baselines() const;
   [[nodiscard]] const Tracked& before(int frames) const;
   void map_frame(Tracked& newest);
+  [[nodiscard]] cv::Mat foretold_flow(const RelativeMotion& motion) const;
   Pair match(const Frame& reference, const Frame& other, const RelativeMotion& motion,
              flow::FlowEstimator& method, const cv::Mat& initial);
   void refine(Pair& pair, const Frame& reference);

@@ -38,7 +38,7 @@ void RunTally::add(const MapperUpdate& update) {
 
 void RunTally::add_depths(const DepthImage& depth) {
   const auto range = static_cast<float>(map_.range);
-  const auto largest = static_cast<float>(map_.hit_max_sigma * map_.hit_max_sigma);
+  const auto largest = static_cast<float>(map_.hit_max_relative_sigma * map_.hit_max_relative_sigma);
   for (int v = 0; v < depth.depth.rows; ++v) {
     const auto* z = depth.depth.ptr<float>(v);
     const auto* variance = depth.variance.empty() ? nullptr : depth.variance.ptr<float>(v);
@@ -47,7 +47,7 @@ void RunTally::add_depths(const DepthImage& depth) {
       ++given_.depths;
       if (z[u] > range) {
         ++given_.depths_beyond;
-      } else if (variance != nullptr && !(variance[u] <= largest)) {
+      } else if (variance != nullptr && !(variance[u] <= largest * z[u] * z[u])) {
         ++given_.depths_uncertain;
       }
     }
