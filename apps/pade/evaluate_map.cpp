@@ -146,7 +146,7 @@ evaluation::RigidAlignment alignment_of(const std::vector<ComparedFrame>& frames
 MapMeasures measures_of(const mapping::OccupancyMap& map, const evaluation::SeenSurface& seen,
                         const evaluation::PlacedSurface& surface) {
   const auto counts = map.counts();
-  return {counts.occupied, counts.free, evaluation::surface_shares(map, seen.voxels(surface)),
+  return {counts.occupied, counts.free, evaluation::surface_shares(map, seen.voxels(surface), surface),
           evaluation::phantoms(map, surface)};
 }
 

@@ -78,8 +78,13 @@ nlohmann::json summary(const NavigationRun& run) {
                              {"rotation_95_deg", run.score->rotation_95 / kDegree},
                              {"nees_mean", run.score->nees_mean},
                              {"rotation_nees_mean", run.score->rotation_nees_mean},
+                             {"length_nees_mean", run.score->length_nees_mean},
+                             {"direction_95_deg", run.score->direction_95 / kDegree},
+                             {"direction_nees_mean", run.score->direction_nees_mean},
                              {"scale_valid_where_good", run.score->valid_where_good},
-                             {"scale_invalid_where_bad", run.score->invalid_where_bad}};
+                             {"scale_invalid_where_bad", run.score->invalid_where_bad},
+                             {"direction_valid_where_good", run.score->direction_valid_where_good},
+                             {"direction_invalid_where_bad", run.score->direction_invalid_where_bad}};
   }
   return json;
 }

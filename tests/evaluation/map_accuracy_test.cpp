@@ -119,13 +119,31 @@ TEST(SurfaceShares, AreThoseOfAKnownMap) {
     if (voxel[1] >= 5) ++expected.unknown;
     if (voxel[1] < 1) ++expected.occupied_or_neighbour;
   }
-  const SurfaceShares found = surface_shares(map, voxels);
+  const SurfaceShares found = surface_shares(map, voxels, PlacedSurface(surface));
   EXPECT_GT(expected.free, 0U);
   EXPECT_EQ(found.voxels, expected.voxels);
   EXPECT_EQ(found.occupied, expected.occupied);
   EXPECT_EQ(found.free, expected.free);
   EXPECT_EQ(found.unknown, expected.unknown);
   EXPECT_EQ(found.occupied_or_neighbour, expected.occupied_or_neighbour);
+}
+
+/// A wall on the face between two layers may be in either; free it is only where both are.
+TEST(SurfaceShares, OfAWallOnAFaceAreThoseOfBothLayers) {
+  const Surface surface = wall_at(3);
+  SeenSurface seen(kSide, 8);
+  seen.add(flat_depth(3), small_camera(), looking_along_x());
+  const std::vector<Voxel> voxels = seen.voxels(PlacedSurface(surface));
+  const auto shares = [&](int before, int behind) {
+    const OccupancyMap map = map_of(kRoom, [&](const Vector3d& p) { return p.x() < 3 ? before : behind; });
+    return surface_shares(map, voxels, PlacedSurface(surface));
+  };
+  EXPECT_GT(voxels.size(), 100U);
+  EXPECT_EQ(shares(1, -1).occupied, voxels.size());
+  EXPECT_EQ(shares(-1, 1).occupied, voxels.size());
+  EXPECT_EQ(shares(-1, -1).free, voxels.size());
+  EXPECT_EQ(shares(-1, 0).unknown, voxels.size());
+  EXPECT_EQ(shares(0, -1).unknown, voxels.size());
 }
 
 TEST(Phantoms, AreCountedByTheDistanceOfTheBox) {

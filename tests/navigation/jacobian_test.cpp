@@ -23,6 +23,7 @@ NavigationState random_state(Random& random) {
   state.position_bias = random.normal3();
   state.height_bias = random.normal();
   state.angular_rate = random.normal3();
+  state.iron = 0.05 * random.normal3();
   return state;
 }
 
@@ -115,6 +116,10 @@ INSTANTIATE_TEST_SUITE_P(
         Model{"AzimuthOfAField",
               [](const NavigationState& s) {
                 return padded(*predict_azimuth(s, {0.6, 0.3, -0.2}));
+              }},
+        Model{"AzimuthOfAMagnetometer",
+              [](const NavigationState& s) {
+                return padded(*predict_magnetic_azimuth(s, {0.6, 0.4, -0.7}));
               }},
         Model{"RangeToGround", [](const NavigationState& s) { return padded(*predict_range(s, -20)); }}),
     [](const auto& parameter) { return parameter.param.name; });

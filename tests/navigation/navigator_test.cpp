@@ -287,5 +287,105 @@ TEST(Navigator, BarometerAndMagnetometerCarryHeightAndYawThroughAnOutage) {
   EXPECT_LT(std::abs(rotation_log(difference).z()), 5 * kDegree);
 }
 
+TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
+  // A vehicle that flies straight on learns nothing of its yaw: the GNSS gives the length alone.
+  NavigationLog log;
+  simulation::Imu imu(ImuModel::industrial(), 7);
+  simulation::Gnss gnss({}, 8);
+  for (int i = 0; i < 200 * 8; ++i) {
+    simulation::KinematicState state;
+    state.time = at(i / 200.0);
+    state.velocity = {2, 0, 0};
+    state.position = {2 * i / 200.0, 0, 0};
+    log.imu.push_back(imu.sample(state));
+    if (i % 40 != 0) continue;
+    const auto epoch = gnss.sample(state);
+    log.gnss.fixes.push_back(epoch.fix);
+    log.gnss.velocities.push_back(epoch.velocity);
+  }
+  const auto answer = [&](double heading_sigma) {
+    Navigator navigator(NavigatorOptions{});
+    ReplayOptions replay_options;
+    for (double t = 2; t < 8; t += 1) replay_options.headings.push_back({at(t), 0, heading_sigma});
+    RelativePose result;
+    replay(log, navigator, replay_options, [&](Time now) {
+      if (now == at(7)) result = navigator.relative_pose(at(6.9), at(7), Pose{});
+    });
+    EXPECT_EQ(result.answer, Answer::valid);
+    return result;
+  };
+  const RelativePose doubtful = answer(0.45);
+  const RelativePose known = answer(0.03);
+  EXPECT_TRUE(doubtful.scale_valid);
+  EXPECT_FALSE(doubtful.direction_valid);
+  EXPECT_EQ(doubtful.status, NavigationStatus::levelled);
+  EXPECT_TRUE(known.scale_valid);
+  EXPECT_TRUE(known.direction_valid);
+}
+
+TEST(Navigator, LearnsTheGyroscopeBiasFromACompassWithIronWithinSeconds) {
+  double nees = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    NavigationLog log;
+    simulation::Imu imu(ImuModel::industrial(), seed);
+    simulation::Gnss gnss({}, seed + 100);
+    simulation::Magnetometer compass({}, seed + 200);
+    for (int i = 0; i <= 200 * 6; ++i) {
+      simulation::KinematicState state;
+      state.time = at(i / 200.0);
+      state.velocity = {2, 0, 0};
+      state.position = {2 * i / 200.0, 0, 0};
+      log.imu.push_back(imu.sample(state));
+      if (i % 10 == 0) log.magnetometer.push_back(compass.sample(state));
+      if (i % 40 != 0) continue;
+      const auto epoch = gnss.sample(state);
+      log.gnss.fixes.push_back(epoch.fix);
+      log.gnss.velocities.push_back(epoch.velocity);
+    }
+    for (MagneticField& m : log.magnetometer) m.sigma = MagneticField{}.sigma;  // as a log has it
+    Navigator navigator(NavigatorOptions{});
+    AbsolutePose end;
+    RelativePose motion;
+    replay(log, navigator, {}, [&](Time now) {
+      if (now != at(6)) return;
+      end = navigator.absolute_pose(now);
+      motion = navigator.relative_pose(at(5.9), now, Pose{});
+    });
+    ASSERT_EQ(end.answer, Answer::valid) << "seed " << seed;
+    const Vector3d error = end.gyroscope_bias - imu.gyroscope_bias();
+    EXPECT_LT(error.norm(), 0.012) << "seed " << seed;  // 0.5 °/s per axis when switched on
+    const Vector3d turn = rotation_log(motion.motion.R_reference_other);
+    nees += turn.dot(motion.motion.covariance.bottomRightCorner<3, 3>().ldlt().solve(turn)) / 20;
+  }
+  EXPECT_GT(nees, 1.5);
+  EXPECT_LT(nees, 5);
+}
+
+TEST(Navigator, PublishesADoubtfulYawWithTheDoubtOfTheWholeBank) {
+  // Without compass or heading: the bank of hypotheses becomes one filter that knows how far they part.
+  double nees = 0;
+  constexpr int kSeeds = 12;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const Flight path{.rest = 0, .speed = 1.5};
+    const auto log = record(path, 20, ImuModel::industrial(), single_point(), 40 + seed);
+    Navigator navigator(options());
+    AbsolutePose first;
+    Time time;
+    replay(log, navigator, ReplayOptions{}, [&](Time now) {
+      if (first.answer == Answer::valid) return;
+      first = navigator.absolute_pose(now);
+      time = now;
+    });
+    ASSERT_EQ(first.answer, Answer::valid) << "seed " << seed;
+    const auto truth = path.at(time.seconds());
+    const Quaterniond difference = first.T_world_body.rotation * truth.R_world_body.conjugate();
+    const Eigen::RowVector3d up = first.T_world_body.matrix3().row(2);
+    const double variance = (up * first.covariance.topLeftCorner<3, 3>() * up.transpose()).value();
+    EXPECT_LT(std::sqrt(variance), 0.35);
+    nees += std::pow(rotation_log(difference).z(), 2) / variance / kSeeds;
+  }
+  EXPECT_LT(nees, 2.5);
+}
+
 }  // namespace
 }  // namespace pade::navigation

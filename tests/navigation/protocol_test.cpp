@@ -50,15 +50,16 @@ class Protocol : public testing::Test {
   }
 };
 
-/// Of the pairs with an error under 10 % of the baseline, the share that a threshold on baseline over sigma
-/// keeps when it refuses 95 % of those with an error over 20 %: the best that any threshold does.
+/// Of the pairs whose length is wrong by less than 10 % of the baseline, the share that a threshold on
+/// baseline over sigma keeps when it refuses 95 % of those wrong by more than 20 %: the best that any
+/// threshold does.
 template <class Statistic>
 double kept_at_95(const std::vector<evaluation::MotionError>& errors, const Statistic& statistic) {
   std::vector<double> bad;
   std::vector<double> good;
   for (const auto& e : errors) {
-    if (e.translation > 0.2 * e.baseline) bad.push_back(statistic(e));
-    if (e.translation < 0.1 * e.baseline) good.push_back(statistic(e));
+    if (e.length > 0.2 * e.baseline) bad.push_back(statistic(e));
+    if (e.length < 0.1 * e.baseline) good.push_back(statistic(e));
   }
   const double threshold = evaluation::quantile(bad, 0.95);
   const auto kept = std::count_if(good.begin(), good.end(), [&](double s) { return s > threshold; });
@@ -66,7 +67,18 @@ double kept_at_95(const std::vector<evaluation::MotionError>& errors, const Stat
 }
 
 double kept_at_95(const std::vector<evaluation::MotionError>& errors) {
-  return kept_at_95(errors, [](const auto& e) { return e.estimated_baseline / e.tail_sigma; });
+  return kept_at_95(errors, [](const auto& e) { return e.estimated_baseline / e.length_sigma; });
+}
+
+/// The number of sigmas in the limit below which 95 % of the bad pairs lie.
+template <class Bad, class Statistic>
+double sigmas_at_95(const std::vector<evaluation::MotionError>& errors, const Bad& bad,
+                    const Statistic& statistic) {
+  std::vector<double> values;
+  for (const auto& e : errors) {
+    if (bad(e)) values.push_back(statistic(e));
+  }
+  return evaluation::quantile(values, 0.95);
 }
 
 /// The errors with the rms that the other draws have at the same time in place of the predicted sigma: of an
@@ -76,11 +88,11 @@ std::vector<evaluation::MotionError> with_rms_of_others(
   std::vector<evaluation::MotionError> result;
   for (std::size_t i = 0; i < draws.front().size(); ++i) {
     double sum = 0;
-    for (const auto& draw : draws) sum += draw[i].translation * draw[i].translation;
+    for (const auto& draw : draws) sum += draw[i].length * draw[i].length;
     for (const auto& draw : draws) {
       result.push_back(draw[i]);
-      const double others = sum - draw[i].translation * draw[i].translation;
-      result.back().tail_sigma = std::sqrt(others / static_cast<double>(draws.size() - 1));
+      const double others = sum - draw[i].length * draw[i].length;
+      result.back().length_sigma = std::sqrt(others / static_cast<double>(draws.size() - 1));
     }
   }
   return result;
@@ -90,6 +102,7 @@ TEST_F(Protocol, TwentySeeds) {
   for (const bool carrier : {false, true}) {
     const auto log = recording("mav_mh01", carrier ? "gnss_rtk_5hz.csv" : "gnss_spp_5hz.csv");
     std::vector<double> t95, t50, t95_long, rotation, velocity, tilt, nees, unsafe, lost, kept;
+    std::vector<double> rotation_nees, length_nees, direction_nees;
     std::vector<double> unsafe_long, lost_long, unsafe_all, lost_all;
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
       NavigationProtocol protocol;
@@ -103,6 +116,9 @@ TEST_F(Protocol, TwentySeeds) {
       velocity.push_back(f.velocity_rms);
       tilt.push_back(f.tilt_rms / kDegree);
       nees.push_back(f.short_pairs.nees_mean);
+      rotation_nees.push_back(f.short_pairs.rotation_nees_mean);
+      length_nees.push_back(f.short_pairs.length_nees_mean);
+      direction_nees.push_back(f.short_pairs.direction_nees_mean);
       unsafe.push_back(-f.short_pairs.invalid_where_bad);
       lost.push_back(-f.short_pairs.valid_where_good);
       kept.push_back(-kept_at_95(f.short_errors));
@@ -126,6 +142,14 @@ TEST_F(Protocol, TwentySeeds) {
         "    scale_valid false where bad / true where good, pairs 0.5 s apart: %.3f / %.3f; pairs of both "
         "lengths together: %.3f / %.3f\n",
         -worst(unsafe_long), -worst(lost_long), -worst(unsafe_all), -worst(lost_all));
+    const auto least = [](const std::vector<double>& values) {
+      return *std::min_element(values.begin(), values.end());
+    };
+    std::printf("    NEES of rotation (3) %.2f..%.2f, length (1) %.2f..%.2f, direction (2) %.2f..%.2f\n",
+                least(rotation_nees), worst(rotation_nees), least(length_nees), worst(length_nees),
+                least(direction_nees), worst(direction_nees));
+    EXPECT_GT(least(rotation_nees), 1.8);
+    EXPECT_LT(worst(rotation_nees), 5);
     EXPECT_LT(worst(t95), carrier ? 0.85 : 1.3);
     EXPECT_LT(worst(t50), 0.6);
     EXPECT_LT(worst(t95_long), 5.8);
@@ -192,8 +216,20 @@ TEST_F(Protocol, ScaleValidOverTwentyDrawsOfTheGnssNoise) {
     std::printf(
         "    at 95 %% of all bad pairs refused: kept %.4f; by an oracle of the true baseline %.4f, of the "
         "IMU's errors %.4f\n",
-        kept_at_95(pooled), kept_at_95(pooled, [](const auto& e) { return e.baseline / e.tail_sigma; }),
+        kept_at_95(pooled), kept_at_95(pooled, [](const auto& e) { return e.baseline / e.length_sigma; }),
         kept_at_95(with_rms_of_others(draws)));
+    std::printf(
+        "    direction_valid false where bad %.4f of %zu, true where good %.4f of %zu; thresholds for 0.95: "
+        "length "
+        "%.2f, direction %.2f sigmas\n",
+        all.direction_invalid_where_bad, all.direction_bad, all.direction_valid_where_good,
+        all.direction_good,
+        sigmas_at_95(
+            pooled, [](const auto& e) { return e.length > 0.2 * e.baseline; },
+            [](const auto& e) { return 0.2 * e.estimated_baseline / e.length_sigma; }),
+        sigmas_at_95(
+            pooled, [](const auto& e) { return e.direction > 0.35; },
+            [](const auto& e) { return 0.35 / e.direction_sigma; }));
     EXPECT_GT(all.invalid_where_bad, 0.94);
     EXPECT_GT(all.valid_where_good, 0.77);  // 0.80 is wanted: docs/navigation.md, "Limits"
   }

@@ -41,7 +41,7 @@ struct BarometricHeight {
 struct MagneticField {
   Time time;
   Eigen::Vector3d field = Eigen::Vector3d::Zero();  ///< body axes, any unit
-  double sigma = 0.05;  ///< white part per axis, as a fraction of the field's norm
+  double sigma = 0.006;  ///< white part per axis, as a fraction of the field's norm
 };
 
 /// The yaw of the body: angle of its x axis from east, towards north.

@@ -18,6 +18,9 @@ constexpr double kTukey = 4.685;  // 95 % efficiency on normal noise
 constexpr int kBlocksAcross = 6;  // blocks of pixels whose errors count as independent of each other
 constexpr int kBlocks = kBlocksAcross * kBlocksAcross;
 constexpr double kStartCorrelation = 4;  // before it is known
+constexpr double kNearest = 0.5;         // m: no pixel is nearer
+constexpr double kTypicalDepth = 8;      // m
+constexpr double kSettled = 0.9;         // of the robust scale before
 constexpr double kHoverParallax = 2;     // flow sigmas of median parallax
 constexpr double kLargestSigma = 1.5;    // px across the lines: more is no noise
 constexpr double kHoverDirection = 0.5;  // rad: a direction this uncertain is none
@@ -98,13 +101,13 @@ class Problem {
     lines_.resize(matches.size());
   }
 
-  Sums sums(const Vector6d& z) {
+  Sums sums(const Vector6d& z, bool coarse) {
     const Vector6d step = root_ * z;
     Matrix6d turned = root_;
     turned.topRows<3>() = chart_.turn(step) * root_.topRows<3>();
     Sums out;
     measure(chart_.at(step), out);
-    accumulate(turned, out);
+    accumulate(turned, coarse, out);
     return out;
   }
 
@@ -123,7 +126,7 @@ class Problem {
     out.parallax = median(parallaxes_);
   }
 
-  void accumulate(const Matrix6d& root, Sums& out) const {
+  void accumulate(const Matrix6d& root, bool coarse, Sums& out) const {
     Eigen::Matrix<double, 6, kBlocks> of_blocks = Eigen::Matrix<double, 6, kBlocks>::Zero();
     double slopes = 0;
     double weights = 0;
@@ -133,8 +136,13 @@ class Problem {
       const double sigma = out.flow_sigma * matches_[i].sigma;
       const double u = line.residual / (kTukey * sigma);
       if (std::abs(u) >= 1) continue;
+      if (!coarse && line.along < -kTukey * sigma) continue;  // behind the cameras
+      // Near the epipole noise makes any inverse depth, along / length, and with it any derivative by t.
+      if (std::abs(line.along) > line.length / kNearest) continue;
       ++out.inliers;
-      const double weight = (1 - u * u) * (1 - u * u);
+      const double trusted = line.length * line.length;
+      const double doubtful = std::pow(kTypicalDepth * sigma, 2);
+      const double weight = (1 - u * u) * (1 - u * u) * trusted / (trusted + doubtful);
       weights += weight;
       slopes += (1 - u * u) * (1 - 5 * u * u);
       Vector6d g;
@@ -174,10 +182,22 @@ struct Measurement {
   double correlation;  // this many pixels count as one
 };
 
-Measurement measurement(const Sums& sums, double correlation) {
+/// Precision of the error that all pixels share.
+Matrix6d precision_of_floor(const RelativeMotion& motion, const MotionRefinementOptions& options) {
+  const double across = motion.t_reference_other.norm() * options.direction_floor_deg * kRadian;
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(across), Eigen::Vector3d::Constant(options.rotation_floor_deg * kRadian);
+  constexpr double kLeast = 1e-9;
+  return sigma.cwiseMax(kLeast).cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
+Measurement measurement(const Sums& sums, const Matrix6d& floor, double inflation, double correlation) {
   constexpr double kUnseen = 1e-6;  // in units of the prior: the length of the baseline
   const Matrix6d variance = sums.variance + kUnseen * Matrix6d::Identity();
-  const Matrix6d weight = variance.ldlt().solve(sums.information).transpose();
+  const Matrix6d ratio = variance.ldlt().solve(sums.information).transpose();
+  // Smoothstep of the ratio: where most of the gradient is noise, the flow has no say.
+  const Matrix6d square = ratio * ratio;
+  const Matrix6d weight = (3 * square - 2 * square * ratio) * ratio;
   if (!(correlation > 0)) {
     // The scatter of the blocks' gradients over what independent pixels would have, where the flow has a say.
     const Matrix6d posterior = inverse(variance + Matrix6d::Identity());
@@ -185,10 +205,15 @@ Measurement measurement(const Sums& sums, double correlation) {
     const double slope = std::max(kLeastSlope, sums.slope);
     const double expected = (posterior * sums.variance).trace();
     const double found = (posterior * sums.scatter).trace() / (slope * slope);
-    correlation = expected > 0 ? std::max(1.0, found / expected) : 1.0;
+    correlation = inflation * (expected > 0 ? std::max(1.0, found / expected) : 1.0);
   }
-  const Matrix6d information = weight * sums.information / correlation;
-  return {0.5 * (information + information.transpose()), weight * sums.gradient / correlation, correlation};
+  const Matrix6d own = weight * sums.information / correlation;
+  // The error that all pixels share adds its covariance: (own^-1 + floor^-1)^-1 = floor (own + floor)^-1 own.
+  const Matrix6d both = own + floor + kUnseen * Matrix6d::Identity();
+  const Matrix6d share = both.transpose().ldlt().solve(floor).transpose();
+  const Matrix6d information = share * own;
+  return {0.5 * (information + information.transpose()), share * (weight * sums.gradient / correlation),
+          correlation};
 }
 
 void state_length_and_direction(RefinedMotion& out) {
@@ -342,25 +367,35 @@ RefinedMotion MotionRefiner::refine(const RefinementInput& input) {
   const Matrix6d identity = Matrix6d::Identity();
   Problem problem(input.camera, chart, root, matches_, options_.least_sigma);
 
+  // First the robust scale shrinks from the size of the prior's error to that of the flow's; only then is
+  // noise told from information.
   Vector6d z = Vector6d::Zero();
   Sums sums;
   Measurement flow;
+  const Matrix6d floor = root.transpose() * precision_of_floor(prior, options_) * root;
+  bool coarse = true;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    sums = problem.sums(z);
+    const double scale = sums.flow_sigma;
+    sums = problem.sums(z, coarse);
     if (sums.inliers < kFewest) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
-    flow = measurement(sums, iteration < 3 ? kStartCorrelation : 0);
+    if (coarse && iteration > 1 && sums.flow_sigma > kSettled * scale) coarse = false;
+    if (coarse) sums.information = sums.variance;
+    flow = measurement(sums, floor, options_.inflation, coarse ? kStartCorrelation : 0);
     const Vector6d step = -(flow.information + identity).ldlt().solve(flow.gradient + z);
     z += step;
     if (!z.allFinite()) return unchanged(prior, RefinementOutcome::degenerate, out);
     constexpr double kSmall = 1e-3;
-    if (iteration > 4 && step.norm() < kSmall) break;
+    if (!coarse && step.norm() < kSmall) break;
   }
-  sums = problem.sums(z);
+  sums = problem.sums(z, false);
   out.flow_sigma = sums.flow_sigma;
+  out.correlation = flow.correlation;
   out.inlier_share = static_cast<double>(sums.inliers) / static_cast<double>(matches_.size());
   if (sums.inliers < kFewest) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
-  if (sums.parallax < kHoverParallax * sums.flow_sigma)
-    return unchanged(prior, RefinementOutcome::hover, out);
+  if (sums.parallax < kHoverParallax * sums.flow_sigma) {
+    const bool noisy = sums.flow_sigma > kLargestSigma;
+    return unchanged(prior, noisy ? RefinementOutcome::inconsistent : RefinementOutcome::hover, out);
+  }
 
   const Matrix6d posterior = inverse(flow.information + identity);
   out.surprise = z.squaredNorm();

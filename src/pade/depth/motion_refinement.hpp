@@ -20,14 +20,19 @@ struct MotionRefinementOptions {
   bool on = true;
   int pixels = 1200;
   double least_sigma = 0.02;
-  double rotation_floor_deg = 0.002;
-  double direction_floor_deg = 0.1;
+  double inflation = 2;
+  double rotation_floor_deg = 0.0007;
+  double direction_floor_deg = 0.03;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("on", self.on, "whether rotation and direction of translation are refined by the flow");
     field("pixels", self.pixels, "cells of the image, each of which gives its best pixel");
     field("least_sigma", self.least_sigma, "flow across the epipolar lines is never trusted more, px");
+    field(
+        "inflation", self.inflation,
+        "variance of what the flow tells, over what the scatter of parts of the image shows: dense flow has "
+        "errors that reach farther");
     field("rotation_floor_deg", self.rotation_floor_deg,
           "error of the refined rotation that all pixels share (calibration, smoothness of the flow), per "
           "axis");

@@ -41,6 +41,30 @@ bool any_neighbour_occupied(const OccupancyMap& map, const Voxel& voxel, double 
   return false;
 }
 
+/// The state of a voxel that holds surface, with that of the neighbours on whose face the surface lies.
+Occupancy state_of(const OccupancyMap& map, const Voxel& voxel, const PlacedSurface& surface) {
+  constexpr double kOnFace = 1e-3;  // metres
+  const double side = map.options().voxel;
+  const Eigen::AlignedBox3d box = box_of(voxel, side);
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kOnFace);
+  Occupancy state = map.at(centre_of(voxel, side));
+  if (surface.overlaps({box.min() + margin, box.max() - margin})) return state;
+  for (std::size_t face = 0; face < 6 && state != Occupancy::occupied; ++face) {
+    const auto axis = static_cast<Eigen::Index>(face / 2);
+    const bool above = face % 2 != 0;
+    Eigen::AlignedBox3d plate = box;
+    (above ? plate.min() : plate.max())[axis] = (above ? box.max() : box.min())[axis];
+    plate.min()[axis] -= kOnFace;
+    plate.max()[axis] += kOnFace;
+    if (!surface.overlaps(plate)) continue;
+    Voxel neighbour = voxel;
+    neighbour[face / 2] += above ? 1 : -1;
+    const Occupancy other = map.at(centre_of(neighbour, side));
+    if (other != state) state = other == Occupancy::occupied ? other : Occupancy::unknown;
+  }
+  return state;
+}
+
 /// Is the centre of an occupied voxel within `near` of the point?
 bool occupied_within(const OccupancyMap& map, const Eigen::Vector3d& point, double near) {
   const double side = map.options().voxel;
@@ -110,12 +134,13 @@ std::vector<Voxel> SeenSurface::voxels(const PlacedSurface& surface) const {
   return voxels;
 }
 
-SurfaceShares surface_shares(const OccupancyMap& map, const std::vector<Voxel>& surface) {
+SurfaceShares surface_shares(const OccupancyMap& map, const std::vector<Voxel>& voxels,
+                             const PlacedSurface& surface) {
   const double side = map.options().voxel;
   SurfaceShares shares;
-  shares.voxels = surface.size();
-  for (const Voxel& voxel : surface) {
-    const Occupancy state = map.at(centre_of(voxel, side));
+  shares.voxels = voxels.size();
+  for (const Voxel& voxel : voxels) {
+    const Occupancy state = state_of(map, voxel, surface);
     if (state == Occupancy::occupied) ++shares.occupied;
     if (state == Occupancy::free) ++shares.free;
     if (state == Occupancy::unknown) ++shares.unknown;

@@ -51,7 +51,12 @@ struct SurfaceShares {
   std::size_t occupied = 0, free = 0, unknown = 0;  ///< add up to `voxels`
   std::size_t occupied_or_neighbour = 0;            ///< it or one of its 26 neighbours is occupied
 };
-SurfaceShares surface_shares(const mapping::OccupancyMap& map, const std::vector<Voxel>& surface);
+/// @param voxels  that hold the surface. Where it lies on a face, no point of it more than a millimetre
+/// inside of the
+///                voxel, either voxel of the face may hold it: together they are occupied where one is, and
+///                free where both are. (Else rounding would decide about a floor at z = 0.)
+SurfaceShares surface_shares(const mapping::OccupancyMap& map, const std::vector<Voxel>& voxels,
+                             const PlacedSurface& surface);
 
 /// Occupied voxels no part of which is near any surface, seen or not.
 struct Phantoms {

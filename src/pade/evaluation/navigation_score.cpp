@@ -25,6 +25,29 @@ std::optional<TrueState> truth_at(const std::vector<TrueState>& truth, Time time
   return state;
 }
 
+namespace {
+
+/// Errors along and across the estimated baseline.
+void score_blocks(const RelativeMotion& motion, const Eigen::Vector3d& difference,
+                  const Eigen::Vector3d& truth, MotionError& error) {
+  const Eigen::Vector3d& t = motion.t_reference_other;
+  const Eigen::Vector3d d = t.normalized();
+  Eigen::Matrix<double, 3, 2> across;
+  across.col(0) = d.unitOrthogonal();
+  across.col(1) = d.cross(across.col(0));
+  const Eigen::Matrix3d P = motion.covariance.topLeftCorner<3, 3>();
+  const Eigen::Matrix2d Q = across.transpose() * P * across;
+  const Eigen::Vector2d sideways = across.transpose() * difference;
+  error.length = std::abs(t.norm() - truth.norm());
+  error.length_sigma = std::sqrt(d.dot(P * d));
+  error.length_nees = error.length * error.length / (error.length_sigma * error.length_sigma);
+  error.direction = std::atan2(t.cross(truth).norm(), t.dot(truth));
+  error.direction_sigma = Q.norm() / std::sqrt(Q.trace()) / t.norm();
+  error.direction_nees = sideways.dot(Q.ldlt().solve(sideways));
+}
+
+}  // namespace
+
 std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vector<TrueState>& truth) {
   const auto first = truth_at(truth, estimate.t1);
   const auto second = truth_at(truth, estimate.t2);
@@ -42,9 +65,10 @@ std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vec
   error.baseline = T.translation.norm();
   error.estimated_baseline = estimate.motion.t_reference_other.norm();
   error.sigma = std::sqrt(estimate.motion.covariance.topLeftCorner<3, 3>().trace());
-  error.tail_sigma = estimate.motion.covariance.topLeftCorner<3, 3>().norm() / error.sigma;
   error.nees = difference.dot(estimate.motion.covariance.topLeftCorner<3, 3>().ldlt().solve(difference));
+  score_blocks(estimate.motion, difference, T.translation, error);
   error.scale_valid = estimate.scale_valid;
+  error.direction_valid = estimate.direction_valid;
   return error;
 }
 
@@ -57,12 +81,23 @@ double quantile(std::vector<double> values, double share) {
   return values[low] + (rank - static_cast<double>(low)) * (above - values[low]);
 }
 
+namespace {
+constexpr double kWrongDirection = 0.35;  // rad
+}
+
 MotionSummary summarise(const std::vector<MotionError>& errors) {
   std::vector<double> translation;
   std::vector<double> relative;
   std::vector<double> rotation;
   double nees = 0;
   double rotation_nees = 0;
+  double length_nees = 0;
+  double direction_nees = 0;
+  std::vector<double> direction;
+  std::size_t direction_good = 0;
+  std::size_t direction_good_valid = 0;
+  std::size_t direction_bad = 0;
+  std::size_t direction_bad_invalid = 0;
   std::size_t good = 0;
   std::size_t good_valid = 0;
   std::size_t bad = 0;
@@ -73,12 +108,22 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
     if (error.baseline > 0) relative.push_back(error.translation / error.baseline);
     nees += error.nees;
     rotation_nees += error.rotation_nees;
-    if (error.translation < 0.1 * error.baseline) {
+    length_nees += error.length_nees;
+    direction_nees += error.direction_nees;
+    direction.push_back(error.direction);
+    if (error.length < 0.1 * error.baseline) {
       ++good;
       good_valid += error.scale_valid ? 1 : 0;
-    } else if (error.translation > 0.2 * error.baseline) {
+    } else if (error.length > 0.2 * error.baseline) {
       ++bad;
       bad_invalid += error.scale_valid ? 0 : 1;
+    }
+    if (error.direction < 0.5 * kWrongDirection) {
+      ++direction_good;
+      direction_good_valid += error.direction_valid ? 1 : 0;
+    } else if (error.direction > kWrongDirection) {
+      ++direction_bad;
+      direction_bad_invalid += error.direction_valid ? 0 : 1;
     }
   }
   const auto share = [](std::size_t part, std::size_t whole) {
@@ -95,6 +140,13 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
       errors.empty() ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(errors.size());
   summary.nees_mean = nees / count;
   summary.rotation_nees_mean = rotation_nees / count;
+  summary.length_nees_mean = length_nees / count;
+  summary.direction_nees_mean = direction_nees / count;
+  summary.direction_95 = quantile(direction, 0.95);
+  summary.direction_good = direction_good;
+  summary.direction_bad = direction_bad;
+  summary.direction_valid_where_good = share(direction_good_valid, direction_good);
+  summary.direction_invalid_where_bad = share(direction_bad_invalid, direction_bad);
   summary.good = good;
   summary.bad = bad;
   summary.valid_where_good = share(good_valid, good);

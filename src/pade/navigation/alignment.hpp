@@ -11,15 +11,15 @@
 namespace pade::navigation {
 
 struct AlignmentOptions {
-  double level_time = 2.0;               ///< seconds of rest for levelling
-  double rest_rate_sigma = 0.02;         ///< spread of the angular rate that counts as rest, rad/s
-  double rest_force_sigma = 0.7;         ///< spread of the specific force that counts as rest, m/s²
-  double rest_speed = 0.3;               ///< GNSS speed that does not contradict rest, m/s
-  double motion_window = 1.0;            ///< baseline of the first GNSS velocities of a start in motion, s
-  double heading_sigma_magnetic = 0.15;  ///< of a yaw from a single uncalibrated magnetometer, rad
-  int hypotheses = 12;                   ///< yaws of the bank
-  double yaw_known = 0.125;              ///< spread of the bank's yaw at which the best filter is taken, rad
-  double lag = 0.4;                      ///< the bank waits this long for late data, s
+  double level_time = 2.0;              ///< seconds of rest for levelling
+  double rest_rate_sigma = 0.02;        ///< spread of the angular rate that counts as rest, rad/s
+  double rest_force_sigma = 0.7;        ///< spread of the specific force that counts as rest, m/s²
+  double rest_speed = 0.3;              ///< GNSS speed that does not contradict rest, m/s
+  double motion_window = 1.0;           ///< baseline of the first GNSS velocities of a start in motion, s
+  double heading_sigma_magnetic = 0.3;  ///< of a start at a magnetometer's yaw, which updates narrow, rad
+  int hypotheses = 12;                  ///< yaws of the bank
+  double yaw_known = 0.2;               ///< spread of the bank's yaw at which it becomes one filter, rad
+  double lag = 0.4;                     ///< the bank waits this long for late data, s
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -32,7 +32,7 @@ struct AlignmentOptions {
           "baseline of the first GNSS velocities of a start in motion, s");
     field("heading_sigma_magnetic", self.heading_sigma_magnetic, "of a magnetometer's first yaw, rad");
     field("hypotheses", self.hypotheses, "yaws of the bank");
-    field("yaw_known", self.yaw_known, "spread of the bank's yaw that is good enough, rad");
+    field("yaw_known", self.yaw_known, "spread of the bank's yaw at which it becomes one filter, rad");
     field("lag", self.lag, "the start waits this long for late data, s");
   }
 };
@@ -76,6 +76,7 @@ class Alignment {
   struct Hypothesis {
     Filter filter;
     bool alive = false;
+    double weight = 0;  ///< probability relative to the best
   };
 
   bool start_from_rest(Timeline& timeline, Time now);
@@ -83,6 +84,7 @@ class Alignment {
   bool start_in_motion(Timeline& timeline, Time now);
   void begin_at_first_fix(const Timeline& timeline, Time until);
   AlignmentPhase weigh();
+  void merge();
 
   AlignmentOptions options_;
   std::vector<Hypothesis> bank_;

@@ -167,8 +167,14 @@ void Filter::flush() {
       (1 - position_decay * position_decay) * core_.gnss_class.bias_sigma.cwiseAbs2();
   P_(kHeightBias, kHeightBias) +=
       (1 - height_decay * height_decay) * options_.barometer_bias_sigma * options_.barometer_bias_sigma;
+  const double iron_decay = std::exp(-T / options_.iron_correlation_time);
+  P_.middleCols<3>(kIron) *= iron_decay;
+  P_.middleRows<3>(kIron) *= iron_decay;
+  P_.diagonal().segment<3>(kIron).array() +=
+      (1 - iron_decay * iron_decay) * options_.iron_sigma * options_.iron_sigma;
   core_.state.position_bias *= position_decay;
   core_.state.height_bias *= height_decay;
+  core_.state.iron *= iron_decay;
 
   P_.bottomLeftCorner(rest, kCore) = P_.topRightCorner(kCore, rest).transpose();
   core_.pending = {};
@@ -346,22 +352,16 @@ Innovation Filter::update(const Heading& heading) {
 
 Innovation Filter::update(const MagneticField& field, double declination) {
   flush();
-  const auto prediction = predict_azimuth(core_.state, field.field);
-  if (!prediction || !std::isfinite(field.sigma)) return {};
+  const double norm = field.field.norm();
+  if (!std::isfinite(norm) || !(norm > 0) || !std::isfinite(field.sigma)) return {};
+  const auto prediction = predict_magnetic_azimuth(core_.state, field.field / norm);
+  if (!prediction) return {};
   const double north = 0.5 * std::numbers::pi - declination;
   const Eigen::Matrix<double, 1, 1> residual(wrap_angle(north - prediction->value[0]));
-  // The azimuth hangs on the horizontal part of the field alone.
-  const Vector3d world = core_.state.X.R * field.field;
-  const double white = std::max(field.sigma, 1e-3) * world.norm() / world.head<2>().norm();
-  // The vehicle's iron errs the same way for a long time τ: samples dt apart weigh as white noise of the same
-  // density at zero frequency, 2 τ σ²; before that, the n-th by n² σ², so that all together tell what one
-  // does.
-  const double dt = std::max(seconds_between(core_.magnetometer_used, core_.state.time), 1e-3);
-  const double count = ++core_.magnetometer_uses;
-  const double repeats = std::min(std::max(1.0, 2 * options_.compass_correlation_time / dt), count * count);
-  const double variance = white * white + repeats * options_.compass_bias_sigma * options_.compass_bias_sigma;
-  core_.magnetometer_used = core_.state.time;
-  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(variance),
+  // The azimuth hangs on the horizontal part of the field alone: the field's error moves it as the iron does.
+  const double lever = prediction->H.middleCols<3>(kIron).norm();
+  const double sigma = lever * std::max(field.sigma, 1e-3);
+  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
                     options_.gate_probability_1);
 }
 

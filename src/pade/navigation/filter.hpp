@@ -69,9 +69,7 @@ struct FilterCore {
   Vector3d smooth_rotation = Vector3d::Zero();  ///< R_smooth = Exp(smooth_rotation) R, decaying
   Time position_accepted;                       ///< last time a position passed its gate
   Time velocity_accepted;                       ///< last time a velocity did
-  Time magnetometer_used;                       ///< last time an azimuth was
-  int magnetometer_uses = 0;
-  bool velocity_seen = false;   ///< one has since the start
+  bool velocity_seen = false;                   ///< one has since the start
   double log_likelihood = 0;    ///< of all GNSS innovations since the start, bounded per innovation
   int position_rejections = 0;  ///< in a row
   int velocity_rejections = 0;
@@ -103,7 +101,7 @@ class Filter {
   [[nodiscard]] const FilterOptions& options() const { return options_; }
   /// Goes back to a snapshot; forgets all clones.
   void restore(const FilterSnapshot& snapshot);
-  /// Covariance of the 19 errors at state().time.
+  /// Covariance of the 22 errors at state().time.
   BaseMatrix covariance();
 
   /// Moves the state over the interval between two IMU values by their mean (trapezoid). `to` must not lie

@@ -14,15 +14,15 @@ enum class ImuClass { industrial, consumer };
 struct FilterOptions {
   double gravity = 9.80665;  ///< m/s², along world -z; the Earth's rate is below the noise of these sensors
 
-  // White noise: a part that is always there (gyroscopes: the data sheet; accelerometers: what scale and
+  // White noise: a part that is always there (gyroscopes: measured at rest; accelerometers: what scale and
   // alignment errors do in manoeuvres, far above the sheet), and what rotors and engines add. That is
   // measured: white samples of spread s and interval dt have the density s sqrt(dt); vibration has this share
   // of it.
-  double gyroscope_noise = 2.4e-4;        ///< rad/s/sqrt(Hz)
+  double gyroscope_noise = 1.3e-4;        ///< rad/s/sqrt(Hz)
   double accelerometer_noise = 2e-2;      ///< m/s²/sqrt(Hz)
-  double gyroscope_vibration = 0.15;      ///< share
+  double gyroscope_vibration = 0.02;      ///< share
   double accelerometer_vibration = 0.45;  ///< share
-  double gyroscope_bias_walk = 2e-4;      ///< rad/s/sqrt(s)
+  double gyroscope_bias_walk = 4e-5;      ///< rad/s/sqrt(s)
   double accelerometer_bias_walk = 2e-3;  ///< m/s²/sqrt(s)
   double gyroscope_bias_sigma = 0.05;     ///< before the first levelling, rad/s
   double accelerometer_bias_sigma = 0.1;  ///< m/s²
@@ -46,8 +46,8 @@ struct FilterOptions {
   double barometer_bias_sigma = 20;          ///< of its unknown zero, m
   double barometer_correlation_time = 3000;  ///< s
 
-  double compass_bias_sigma = 0.08;       ///< of a magnetic azimuth: iron of the vehicle, rad
-  double compass_correlation_time = 100;  ///< s
+  double iron_sigma = 0.03;  ///< field of the vehicle's iron per body axis, share of the Earth's field
+  double iron_correlation_time = 600;  ///< s
 
   // Robustness.
   double gate_probability_3 = 16.27;  ///< chi-square bound of 3 degrees of freedom (99.9 %)
@@ -86,8 +86,8 @@ struct FilterOptions {
     field("velocity_sigma_floor", self.velocity_sigma_floor, "least sigma of a velocity, m/s");
     field("barometer_bias_sigma", self.barometer_bias_sigma, "of the barometer's zero, m");
     field("barometer_correlation_time", self.barometer_correlation_time, "of the barometer's zero, s");
-    field("compass_bias_sigma", self.compass_bias_sigma, "of a magnetic azimuth, rad");
-    field("compass_correlation_time", self.compass_correlation_time, "of its error, s");
+    field("iron_sigma", self.iron_sigma, "field of the vehicle's iron, share of the Earth's field");
+    field("iron_correlation_time", self.iron_correlation_time, "s");
     field("gate_probability_3", self.gate_probability_3, "chi-square gate, 3 degrees of freedom");
     field("gate_probability_2", self.gate_probability_2, "chi-square gate, 2 degrees of freedom");
     field("gate_probability_1", self.gate_probability_1, "chi-square gate, 1 degree of freedom");

@@ -1,7 +1,7 @@
 // The state of the filter and its error, one notation for code and docs/navigation.md.
 //
-// Error (19): φ rotation, ν velocity, ρ position (left-invariant: X = X̂ exp(ξ), so all in body axes), then
-// δb_g, δb_a, δb_p (GNSS position bias, ENU) and δb_h (barometer zero), additive.
+// Error (22): φ rotation, ν velocity, ρ position (left-invariant: X = X̂ exp(ξ), so all in body axes), then
+// δb_g, δb_a, δb_p (GNSS position bias, ENU), δb_h (barometer zero) and δh (the vehicle's iron), additive.
 #pragma once
 
 #include "pade/core/time.hpp"
@@ -17,7 +17,8 @@ inline constexpr int kAccelerometerBias = 12;
 inline constexpr int kCore = 15;
 inline constexpr int kPositionBias = 15;
 inline constexpr int kHeightBias = 18;
-inline constexpr int kBase = 19;
+inline constexpr int kIron = 19;
+inline constexpr int kBase = 22;
 
 using BaseVector = Eigen::Matrix<double, kBase, 1>;
 using BaseMatrix = Eigen::Matrix<double, kBase, kBase>;
@@ -30,7 +31,8 @@ struct NavigationState {
   Vector3d accelerometer_bias = Vector3d::Zero();  ///< m/s²
   Vector3d position_bias = Vector3d::Zero();       ///< of GNSS positions, ENU, m
   double height_bias = 0;                          ///< of the barometer, m
-  Vector3d angular_rate = Vector3d::Zero();        ///< bias-corrected, at `time`, for lever arms
+  Vector3d iron = Vector3d::Zero();          ///< field of the vehicle, body, as a share of the whole field
+  Vector3d angular_rate = Vector3d::Zero();  ///< bias-corrected, at `time`, for lever arms
 
   /// Moves the estimate by an error: X exp(ξ), biases added.
   void retract(const BaseVector& error) {
@@ -40,6 +42,7 @@ struct NavigationState {
     accelerometer_bias += error.segment<3>(kAccelerometerBias);
     position_bias += error.segment<3>(kPositionBias);
     height_bias += error[kHeightBias];
+    iron += error.segment<3>(kIron);
   }
 };
 

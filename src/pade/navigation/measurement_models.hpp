@@ -79,6 +79,18 @@ inline std::optional<Prediction<1>> predict_azimuth(const NavigationState& state
   return y;
 }
 
+/// Azimuth of the Earth's field, what a magnetometer shows less what the vehicle's iron adds; `field`: of
+/// norm 1.
+inline std::optional<Prediction<1>> predict_magnetic_azimuth(const NavigationState& state,
+                                                             const Vector3d& field) {
+  auto y = predict_azimuth(state, field - state.iron);
+  if (!y) return y;
+  const Matrix3d R = state.X.R.toRotationMatrix();
+  const Vector3d w = R * (field - state.iron);
+  y->H.middleCols<3>(kIron) = Eigen::RowVector3d(w.y(), -w.x(), 0) / w.head<2>().squaredNorm() * R;
+  return y;
+}
+
 /// Distance along body -z to level ground at height h: (p_z - h) / R_zz; none where the body is tilted over
 /// 60°.
 inline std::optional<Prediction<1>> predict_range(const NavigationState& state, double ground_height) {

@@ -7,7 +7,7 @@ namespace pade::navigation {
 namespace {
 
 constexpr double kKeyframeInterval = 0.1;  // s
-constexpr double kYawKnown = 0.2;          // rad, about 11°
+constexpr double kYawKnown = 0.125;        // rad, about 7°
 
 std::size_t capacity(double seconds, double rate) {
   return static_cast<std::size_t>(std::ceil(seconds * rate)) + 8;
@@ -17,8 +17,21 @@ Time shifted(Time time, double seconds) {
   return Time{time.nanoseconds + Time::from_seconds(seconds).nanoseconds};
 }
 
-/// Scale of the tail of |e| for errors e of covariance P: by moments |e|² is c χ², c = tr P² / tr P.
-double tail_sigma(const Matrix3d& P) { return std::sqrt(P.squaredNorm() / P.trace()); }
+/// Standard deviations of a translation along itself and across: that along is of its length. Across it is
+/// the scale of the tail of the error's norm: by moments |e|² is c χ², c = tr P² / tr P.
+struct BaselineSigmas {
+  double along = 0;   ///< m
+  double across = 0;  ///< m
+};
+
+BaselineSigmas baseline_sigmas(const Vector3d& translation, const Matrix3d& covariance) {
+  const Vector3d d = translation.normalized();
+  const Matrix3d projector = Matrix3d::Identity() - d * d.transpose();
+  const Matrix3d across = projector * covariance * projector;
+  const double trace = across.trace();
+  return {std::sqrt(std::max(0.0, d.dot(covariance * d))),
+          trace > 0 ? std::sqrt(across.squaredNorm() / trace) : 0};
+}
 
 /// Buffers reach back over the history, the levelling window and what the bank of hypotheses waits for.
 double buffered_seconds(const NavigatorOptions& options) {
@@ -200,10 +213,11 @@ RelativePose Navigator::relative_pose(Time t1, Time t2, const Pose& T_body_camer
   result.motion.t_reference_other = T.translation;
   result.motion.duration = seconds_between(t1, t2);
   result.motion.covariance = turn * local * turn.transpose();
-  const double sigma = tail_sigma(result.motion.covariance.topLeftCorner<3, 3>());
-  result.scale_valid =
-      result.status >= NavigationStatus::yaw_known &&
-      options_.scale_error_limit * T.translation.norm() > options_.scale_error_sigmas * sigma;
+  const double baseline = T.translation.norm();
+  const BaselineSigmas sigma = baseline_sigmas(T.translation, result.motion.covariance.topLeftCorner<3, 3>());
+  result.scale_valid = options_.scale_error_limit * baseline > options_.scale_error_sigmas * sigma.along;
+  result.direction_valid =
+      options_.direction_error_limit * baseline > options_.direction_error_sigmas * sigma.across;
   return result;
 }
 

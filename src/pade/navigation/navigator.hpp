@@ -32,8 +32,10 @@ struct NavigatorOptions {
   double imu_rate = 500;                       ///< highest expected, Hz; sizes the buffers
   double dead_reckoning_after = 1;             ///< seconds without GNSS velocity
   double longest_gap = 3;                      ///< without IMU data; beyond it the filter starts anew, s
-  double scale_error_limit = 0.2;              ///< of the baseline: the noise bound of the paper
-  double scale_error_sigmas = 2.6;             ///< `scale_valid` asks for limit * baseline > this * sigma
+  double scale_error_limit = 0.2;              ///< of the baseline's length: the noise bound of the paper
+  double scale_error_sigmas = 2.5;      ///< `scale_valid` asks for limit * baseline > this * sigma along it
+  double direction_error_limit = 0.35;  ///< of the baseline's direction: what images can still mend, rad
+  double direction_error_sigmas = 2.7;  ///< `direction_valid` asks for limit * baseline > this * sigma across
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -52,14 +54,18 @@ struct NavigatorOptions {
     field("imu_rate", self.imu_rate, "highest expected, Hz");
     field("dead_reckoning_after", self.dead_reckoning_after, "seconds without GNSS velocity");
     field("longest_gap", self.longest_gap, "without IMU data; beyond it the filter starts anew, s");
-    field("scale_error_limit", self.scale_error_limit, "error of the baseline that spoils depth, relative");
+    field("scale_error_limit", self.scale_error_limit,
+          "error of the baseline's length that spoils depth, relative");
     field("scale_error_sigmas", self.scale_error_sigmas, "sigmas that must fit into it");
+    field("direction_error_limit", self.direction_error_limit,
+          "error of the baseline's direction that images can still mend, rad");
+    field("direction_error_sigmas", self.direction_error_sigmas, "sigmas that must fit into it");
   }
 };
 
 enum class NavigationStatus : std::uint8_t {
   uninitialised,
-  levelled,   ///< attitude but for yaw
+  levelled,   ///< attitude, and yaw with a standard deviation over 0.125 rad or not at all
   yaw_known,  ///< no GNSS velocity has confirmed it yet
   navigating,
   dead_reckoning,  ///< no GNSS velocity for a while
@@ -90,7 +96,8 @@ struct RelativePose {
   Answer answer = Answer::not_initialised;
   /// Reference: the camera at t1, other: at t2. Covariance as RelativeMotion has it.
   RelativeMotion motion;
-  bool scale_valid = false;  ///< the baseline is longer than its doubt allows
+  bool scale_valid = false;      ///< the doubt of the baseline's length is small beside it
+  bool direction_valid = false;  ///< so is that of its direction; says nothing about the length
   NavigationStatus status = NavigationStatus::uninitialised;
 };
 

@@ -82,7 +82,8 @@ NavigationFigures run_protocol(const NavigationLog& log, const navigation::Navig
     if (answer.answer != navigation::Answer::valid) return;
     figures.finite =
         figures.finite && answer.motion.t_reference_other.allFinite() && answer.motion.covariance.allFinite();
-    const auto error = evaluation::score({t1, t2, answer.motion, answer.scale_valid}, log.truth);
+    const auto error =
+        evaluation::score({t1, t2, answer.motion, answer.scale_valid, answer.direction_valid}, log.truth);
     if (error) errors.push_back(*error);
   };
   navigation::replay(log, navigator, replay, [&](Time now) {

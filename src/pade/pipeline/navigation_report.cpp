@@ -191,7 +191,8 @@ std::string baseline_plot(const NavigationLog& log, const NavigationRun& run) {
   for (const FrameMotion& m : run.motions) {
     const double s = 100 * std::sqrt(m.pose.motion.covariance.topLeftCorner<3, 3>().trace());
     sigma.add(m.t2.seconds(), s);
-    const auto e = evaluation::score({m.t1, m.t2, m.pose.motion, m.pose.scale_valid}, log.truth);
+    const auto e =
+        evaluation::score({m.t1, m.t2, m.pose.motion, m.pose.scale_valid, m.pose.direction_valid}, log.truth);
     if (e) error.add(m.t2.seconds(), 100 * e->translation);
   }
   std::vector<Series> series;

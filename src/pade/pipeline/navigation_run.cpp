@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -39,13 +40,25 @@ std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
       body.t_reference_other = moved.translation;
     }
     const auto offset = Time::from_seconds(options.navigator.camera_time_offset).nanoseconds;
-    const auto error = evaluation::score(
-        {Time{m.t1.nanoseconds + offset}, Time{m.t2.nanoseconds + offset}, body, m.pose.scale_valid},
-        log.truth);
+    const auto error = evaluation::score({Time{m.t1.nanoseconds + offset}, Time{m.t2.nanoseconds + offset},
+                                          body, m.pose.scale_valid, m.pose.direction_valid},
+                                         log.truth);
     if (error) errors.push_back(*error);
   }
   if (errors.empty()) return std::nullopt;
   return evaluation::summarise(errors);
+}
+
+/// The longest run of motions each of which begins where the one before ends; the first of equal ones.
+std::span<const FrameMotion> longest_chain(std::span<const FrameMotion> motions) {
+  std::span<const FrameMotion> longest;
+  for (std::size_t begin = 0; begin < motions.size();) {
+    std::size_t end = begin + 1;
+    while (end < motions.size() && motions[end].t1 == motions[end - 1].t2) ++end;
+    if (end - begin > longest.size()) longest = motions.subspan(begin, end - begin);
+    begin = end;
+  }
+  return longest;
 }
 
 }  // namespace
@@ -97,7 +110,7 @@ std::string format_trajectory(const NavigationRun& run) {
 std::string format_relative_motion(const NavigationRun& run) {
   std::string text =
       "# frame 2 in frame 1; covariance of (translation, rotation vector) in frame 1, row by row\n"
-      "t1_s,t2_s,tx,ty,tz,qx,qy,qz,qw,scale_valid,status";
+      "t1_s,t2_s,tx,ty,tz,qx,qy,qz,qw,scale_valid,direction_valid,status";
   for (int i = 0; i < 6; ++i) {
     for (int j = i; j < 6; ++j) fmt::format_to(std::back_inserter(text), ",c{}{}", i, j);
   }
@@ -106,9 +119,9 @@ std::string format_relative_motion(const NavigationRun& run) {
     const Eigen::Vector3d& t = m.pose.motion.t_reference_other;
     const Eigen::Quaterniond q(m.pose.motion.R_reference_other);
     fmt::format_to(std::back_inserter(text),
-                   "{},{},{:.9g},{:.9g},{:.9g},{:.12g},{:.12g},{:.12g},{:.12g},{},{}", to_string(m.t1),
+                   "{},{},{:.9g},{:.9g},{:.9g},{:.12g},{:.12g},{:.12g},{:.12g},{},{},{}", to_string(m.t1),
                    to_string(m.t2), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(),
-                   m.pose.scale_valid ? 1 : 0, to_name(m.pose.status));
+                   m.pose.scale_valid ? 1 : 0, m.pose.direction_valid ? 1 : 0, to_name(m.pose.status));
     for (int i = 0; i < 6; ++i) {
       for (int j = i; j < 6; ++j)
         fmt::format_to(std::back_inserter(text), ",{:.6g}", m.pose.motion.covariance(i, j));
@@ -140,27 +153,55 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
   CameraTrajectory trajectory;
   trajectory.origin = log->gnss.origin;
   trajectory.health = run.health;
-  for (const FrameMotion& m : run.motions) {
-    // After a frame without answer the chain begins again; what came before is left.
-    if (trajectory.times.empty() || trajectory.times.back() != m.t1) {
-      const auto first = std::find_if(run.frames.begin(), run.frames.end(),
-                                      [&](const NavigationFrame& frame) { return frame.time == m.t1; });
-      trajectory.times = {m.t1};
-      trajectory.poses = {camera_pose(first->pose.T_world_body, mounting.T_body_camera)};
-      trajectory.motions.clear();
-      trajectory.scale_valid.clear();
-    }
+  const std::span<const FrameMotion> chain = longest_chain(run.motions);
+  if (!chain.empty()) {
+    const Time start = chain.front().t1;
+    const auto first = std::find_if(run.frames.begin(), run.frames.end(),
+                                    [&](const NavigationFrame& frame) { return frame.time == start; });
+    trajectory.times = {start};
+    trajectory.poses = {camera_pose(first->pose.T_world_body, mounting.T_body_camera)};
+    trajectory.frames_left = run.frames.size() - chain.size() - 1;
+  }
+  for (const FrameMotion& m : chain) {
     const Pose step{Eigen::Quaterniond(m.pose.motion.R_reference_other), m.pose.motion.t_reference_other};
     trajectory.times.push_back(m.t2);
     trajectory.poses.push_back(trajectory.poses.back() * step);
     trajectory.motions.push_back(m.pose.motion);
     trajectory.scale_valid.push_back(m.pose.scale_valid);
+    trajectory.direction_valid.push_back(m.pose.direction_valid);
   }
   if (trajectory.times.empty()) {
     return Error{fmt::format("{}: the filter never knew its yaw within the {} frames (status: {})",
                              folder.string(), frames.size(), to_name(run.health.status))};
   }
   return trajectory;
+}
+
+std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
+  std::vector<std::string> notes;
+  const auto motions = trajectory.motions.size();
+  const auto false_of = [](const std::vector<bool>& flags) {
+    return std::count(flags.begin(), flags.end(), false);
+  };
+  if (const auto doubtful = false_of(trajectory.scale_valid); doubtful > 0) {
+    notes.push_back(
+        fmt::format("{} of {} motions between frames are too short for what the filter knows of their length "
+                    "(scale_valid false)",
+                    doubtful, motions));
+  }
+  if (const auto doubtful = false_of(trajectory.direction_valid); doubtful > 0) {
+    notes.push_back(
+        fmt::format("{} of {} motions between frames have a direction that the filter hardly knows "
+                    "(direction_valid false)",
+                    doubtful, motions));
+  }
+  if (trajectory.frames_left > 0) {
+    notes.push_back(fmt::format(
+        "the filter had to start anew: {} frames with a pose of their own are left out, the {} of the "
+        "longest unbroken chain are kept",
+        trajectory.frames_left, trajectory.times.size()));
+  }
+  return notes;
 }
 
 io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) {
@@ -182,14 +223,9 @@ io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) 
       result.poses.push_back({trajectory->times[i], trajectory->poses[i]});
       result.covariances.push_back(i > 0 ? trajectory->motions[i - 1].covariance : Matrix6d::Zero());
     }
-    const auto doubtful = std::count(trajectory->scale_valid.begin(), trajectory->scale_valid.end(), false);
-    result.motions_without_scale = static_cast<std::size_t>(doubtful);
-    if (doubtful > 0) {
-      result.notes.push_back(
-          fmt::format("{} of {} motions between frames are too short for what the filter knows of them "
-                      "(scale_valid false)",
-                      doubtful, trajectory->scale_valid.size()));
-    }
+    result.motions_without_scale = static_cast<std::size_t>(
+        std::count(trajectory->scale_valid.begin(), trajectory->scale_valid.end(), false));
+    result.notes = notes_on(*trajectory);
     return result;
   };
 }

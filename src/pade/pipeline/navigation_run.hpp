@@ -63,6 +63,8 @@ struct CameraTrajectory {
   std::vector<Pose> poses;  ///< T_world_camera; the motion between neighbours is `motions`, exactly
   std::vector<RelativeMotion> motions;   ///< from frame i (reference) to frame i + 1, with covariance
   std::vector<bool> scale_valid;         ///< of each motion
+  std::vector<bool> direction_valid;     ///< of each motion
+  std::size_t frames_left = 0;           ///< with an answer, but not in the longest unbroken chain
   std::optional<GeodeticOrigin> origin;  ///< of the world, where the GNSS log has one
   navigation::Health health;
 };
@@ -77,12 +79,17 @@ struct CameraMounting {
 /// Runs the filter on imu.csv and gnss.csv (and baro.csv, mag.csv) of a sequence folder. The first pose is
 /// the filter's own; each further one adds the relative motion read from clones, so that corrections of the
 /// absolute position never appear as motion (the price: the chain drifts from the GNSS by the integral of the
-/// velocity's error). Frames before the filter knows its yaw have no pose. Errors: a log that cannot be read;
-/// no frame with a pose.
+/// velocity's error). Frames before the filter knows its yaw have no pose. A filter that has to start anew
+/// breaks the chain: the longest is kept and `frames_left` counts the others. Errors: a log that cannot be
+/// read; no frame with a pose.
 Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
                                                          const std::vector<Time>& frames,
                                                          const CameraMounting& mounting,
                                                          const navigation::NavigatorOptions& options = {});
+
+/// What a person should know of the trajectory: motions of doubtful length and direction, and frames left
+/// out.
+std::vector<std::string> notes_on(const CameraTrajectory& trajectory);
 
 /// What `--poses from-imu-gnss` is called in options and runs.
 inline constexpr const char* poses_from_sensors = "from-imu-gnss";
