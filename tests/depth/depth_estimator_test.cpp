@@ -377,22 +377,30 @@ TEST(DepthStates, WithoutGatesEveryPixelWithAPositiveDepthIsPublished) {
             share(see(pair, DepthOptions{}, 1.0).depth, cv::Mat(pair.truth < 15), DepthState::measured));
 }
 
-TEST(DepthStates, TexturedThingsAtInfinityAreLowParallax) {
+TEST(DepthStates, TexturedThingsAtInfinityAreFarAndOverAShortBaselineLowParallax) {
   // Flow of a textured far field: derotated flow is noise alone.
-  const ScenePair pair(kCamera, {0.2, 0, 0}, Eigen::Vector3d::Zero());
-  FlowField flow = pair.noisy_flow(0.2, 2);
-  Random random(4);
-  for (int v = 0; v < 60; ++v) {
-    for (int u = 0; u < kCamera.width; ++u) {
-      flow.vectors.at<cv::Vec2f>(v, u) = {static_cast<float>(0.2 * random.normal()),
-                                          static_cast<float>(0.2 * random.normal())};
+  for (const bool large : {true, false}) {
+    const ScenePair pair(kCamera, {large ? 0.2 : 0.02, 0, 0}, Eigen::Vector3d::Zero());
+    FlowField flow = pair.noisy_flow(0.2, 2);
+    Random random(4);
+    for (int v = 0; v < 60; ++v) {
+      for (int u = 0; u < kCamera.width; ++u) {
+        flow.vectors.at<cv::Vec2f>(v, u) = {static_cast<float>(0.2 * random.normal()),
+                                            static_cast<float>(0.2 * random.normal())};
+      }
     }
+    const DepthOptions options;
+    const DepthImage depth = DepthEstimator(options).estimate({pair.camera, pair.motion, flow});
+    cv::Mat far = cv::Mat::zeros(kCamera.size(), CV_8UC1);
+    far.rowRange(0, 60).setTo(255);
+    EXPECT_GE(share(depth, far, large ? DepthState::far : DepthState::low_parallax), 0.95);
+    EXPECT_LE(share(depth, far, DepthState::measured), 0.003);  // one-sided 3 sigma is 0.0013
+    cv::Mat bound = depth.bound.rowRange(0, 60).clone();
+    cv::patchNaNs(bound, 0);
+    EXPECT_EQ(cv::countNonZero((bound >= options.range) &
+                               (depth.state.rowRange(0, 60) == static_cast<int>(DepthState::low_parallax))),
+              0);
   }
-  const DepthImage depth = DepthEstimator(DepthOptions{}).estimate({pair.camera, pair.motion, flow});
-  cv::Mat far = cv::Mat::zeros(kCamera.size(), CV_8UC1);
-  far.rowRange(0, 60).setTo(255);
-  EXPECT_GE(share(depth, far, DepthState::low_parallax), 0.95);
-  EXPECT_LE(share(depth, far, DepthState::measured), 0.003);  // one-sided 3 sigma is 0.0013
 }
 
 TEST(DepthStates, FlowAcrossTheEpipolarLineIsInconsistent) {

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "pade/core/pose.hpp"
 #include "pade/core/random.hpp"
+#include "pade/depth/derotation.hpp"
 
 namespace pade::depth {
 namespace {
@@ -69,35 +72,91 @@ KernelParameters random_parameters(Random& random) {
   k.right = 500.5F;
   k.top = -240;
   k.bottom = 240;
-  for (const int diagonal : {0, 6, 11, 15, 18, 20})
-    k.pose[diagonal] = static_cast<float>(1e-6 * random.uniform());
+  k.bound_k = static_cast<float>(random.uniform(1, 4));
+  k.relative2 = static_cast<float>(random.uniform(0, 1e-4));
+  k.sigma_scale2 = static_cast<float>(random.uniform(0.5, 2));
+  Matrix6d root;  // of the covariance: millimetres and milliradians, in any direction
+  for (int i = 0; i < 36; ++i) root(i / 6, i % 6) = 1e-3 * random.normal();
+  const Matrix6d covariance = root * root.transpose();
+  int index = 0;
+  for (int r = 0; r < 6; ++r) {
+    for (int c = r; c < 6; ++c) k.pose[index++] = static_cast<float>(covariance(r, c));
+  }
   return k;
 }
 
-/// The kernel's arithmetic in a few lines of double precision: the slow twin. NaN = no depth.
-double twin_depth(const KernelParameters& k, const Row& row, std::size_t i) {
-  const double x = row.x[i];
-  const double y = row.y;
-  const double w[2] = {row.flow[2 * i], row.flow[2 * i + 1]};
-  double d[2] = {w[0], w[1]};
-  if (k.derotation == KernelDerotation::exact) {
-    const double ray[3] = {(x + w[0]) / k.fx, (y + w[1]) / k.fy, 1};
-    double b[3];
-    for (int r = 0; r < 3; ++r) {
-      b[r] = ray[r] + k.turn[3 * r] * ray[0] + k.turn[3 * r + 1] * ray[1] + k.turn[3 * r + 2] * ray[2];
-    }
-    d[0] = k.fx * b[0] / b[2] - x;
-    d[1] = k.fy * b[1] / b[2] - y;
-  } else if (k.derotation == KernelDerotation::first_order) {
-    const double u = x / k.fx;
-    const double v = y / k.fy;
-    d[0] += k.fx * (-u * v * k.omega[0] + (1 + u * u) * k.omega[1] - v * k.omega[2]);
-    d[1] += k.fy * (-(1 + v * v) * k.omega[0] + u * v * k.omega[1] + u * k.omega[2]);
+/// The kernel's arithmetic in a few lines of double precision: the slow twin.
+struct Twin {
+  double z;      // depth whether or not it is published
+  double bound;  // NaN = none
+};
+
+Eigen::Vector2d turned(const float* turn, const Camera& camera, const Eigen::Vector2d& p) {
+  Eigen::Matrix3d rotation;
+  for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = static_cast<double>(turn[i]) + (i % 4 == 0 ? 1 : 0);
+  const Eigen::Vector3d b = rotation * Eigen::Vector3d(p.x() / camera.fx, p.y() / camera.fy, 1);
+  return {camera.fx * b.x() / b.z(), camera.fy * b.y() / b.z()};
+}
+
+Matrix6d pose_covariance(const KernelParameters& k) {
+  Matrix6d covariance;
+  int index = 0;
+  for (int r = 0; r < 6; ++r) {
+    for (int c = r; c < 6; ++c) covariance(r, c) = covariance(c, r) = static_cast<double>(k.pose[index++]);
   }
-  const double a[2] = {x * k.tz - k.fx_tx, y * k.tz - k.fy_ty};
-  const double aa = a[0] * a[0] + a[1] * a[1];
-  const double ad = a[0] * d[0] + a[1] * d[1];
-  return (k.samelson ? ad / (d[0] * d[0] + d[1] * d[1]) : aa / ad) + k.add_tz;
+  return k.has_pose ? covariance : Matrix6d::Zero();
+}
+
+Twin twin(const KernelParameters& k, const Row& row, std::size_t i, bool with_sigma) {
+  const Camera camera{0, 0, k.fx, k.fy, 0, 0};
+  const Eigen::Vector3d t(k.fx_tx / k.fx, k.fy_ty / k.fy, k.tz);
+  const Eigen::Vector2d p(row.x[i], row.y);
+  const Eigen::Vector2d w(row.flow[2 * i], row.flow[2 * i + 1]);
+  Eigen::Vector2d d = w;
+  Eigen::Vector2d match = p + w;
+  if (k.derotation == KernelDerotation::first_order) {
+    d += times_B(camera, p, {k.omega[0], k.omega[1], k.omega[2]});
+  } else if (k.derotation != KernelDerotation::none) {
+    d = turned(k.turn, camera, p + w) - p;
+  }
+  if (k.derotation == KernelDerotation::none || k.derotation == KernelDerotation::remaining) {
+    match = turned(k.view, camera, p + w);
+  }
+  const Eigen::Vector2d a = -times_A(camera, p, t);
+  const double ad = a.dot(d);
+  Twin out{(k.samelson ? ad / d.squaredNorm() : a.squaredNorm() / ad) + k.add_tz,
+           std::numeric_limits<double>::quiet_NaN()};
+
+  // Z_min = max(|a| - k sigma_a, 0) / (seen + k sigma) + t_z.
+  const double flow_sigma2 =
+      (with_sigma ? static_cast<double>(k.sigma_scale2) * row.sigma[i] * row.sigma[i] : k.sigma2) +
+      k.relative2 * d.squaredNorm();
+  const Matrix6d covariance = pose_covariance(k);
+  Eigen::Matrix<double, 2, 3> A;
+  Eigen::Matrix<double, 2, 3> B;
+  for (int axis = 0; axis < 3; ++axis) {
+    A.col(axis) = times_A(camera, p, Eigen::Vector3d::Unit(axis));
+    B.col(axis) = times_B(camera, p + d, Eigen::Vector3d::Unit(axis));
+  }
+  const double sigma_a = std::sqrt((A * covariance.topLeftCorner<3, 3>() * A.transpose()).trace());
+  const Eigen::Vector2d direction = a.normalized();
+  const double by_rotation =
+      direction.dot(B * covariance.bottomRightCorner<3, 3>() * B.transpose() * direction);
+  const bool directed = a.norm() >= 6 * sigma_a;
+  const double along = direction.dot(d);
+  const double across = direction.x() * d.y() - direction.y() * d.x();
+  const double seen = directed ? std::max(along, 0.0) : d.norm();
+  const double least = std::max(a.norm() - k.bound_k * sigma_a, 0.0);
+  const double bound = least / (seen + k.bound_k * std::sqrt(flow_sigma2 + by_rotation)) + k.add_tz;
+  const bool inside =
+      match.x() >= k.left && match.x() <= k.right && match.y() >= k.top && match.y() <= k.bottom;
+  const bool consistent = !directed || across * across <= k.residual2 * flow_sigma2 ||
+                          across * across <= k.tangent2 * along * along;
+  const bool behind = directed && along < 0 && along * along > k.parallax2 * flow_sigma2;
+  if (row.gate[i] == 0 && inside && consistent && !behind && least > 0 && bound > 0 && flow_sigma2 < 1e6) {
+    out.bound = bound;
+  }
+  return out;
 }
 
 using Kernel = decltype(&baseline::depth_row);
@@ -110,32 +169,52 @@ Output run(Kernel kernel, const KernelParameters& k, const Row& row, bool with_s
   return out;
 }
 
+bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
+  return std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+}
+
 TEST(DepthKernel, EveryInstructionSetGivesTheSameBitsAndAgreesWithItsSlowTwin) {
   Random random(3);
   int measured = 0;
-  for (int trial = 0; trial < 48; ++trial) {
+  int bounded = 0;
+  int on_the_brink = 0;
+  for (int trial = 0; trial < 64; ++trial) {
     const Row row = random_row(random);
     KernelParameters k = random_parameters(random);
-    k.derotation = static_cast<KernelDerotation>(trial % 3);
-    k.samelson = (trial / 3) % 2 == 1;
-    k.has_pose = (trial / 6) % 2 == 1;
-    const bool with_sigma = (trial / 12) % 2 == 1;
+    k.derotation = static_cast<KernelDerotation>(trial % 4);
+    k.samelson = (trial / 4) % 2 == 1;
+    k.has_pose = (trial / 8) % 2 == 1;
+    const bool with_sigma = (trial / 16) % 2 == 1;
     const Output slow = run(&baseline::depth_row, k, row, with_sigma);
     for (const auto set : {simd::InstructionSet::avx2, simd::InstructionSet::avx512}) {
       if (!simd::available(set, simd::best())) continue;
       const Output fast = run(PADE_DISPATCH(depth_row, set), k, row, with_sigma);
       EXPECT_EQ(fast.state, slow.state);
-      EXPECT_EQ(std::memcmp(fast.depth.data(), slow.depth.data(), kCount * sizeof(float)), 0);
-      EXPECT_EQ(std::memcmp(fast.variance.data(), slow.variance.data(), kCount * sizeof(float)), 0);
+      EXPECT_TRUE(same_bits(fast.depth, slow.depth));
+      EXPECT_TRUE(same_bits(fast.variance, slow.variance));
+      EXPECT_TRUE(same_bits(fast.own_variance, slow.own_variance));
+      EXPECT_TRUE(same_bits(fast.bound, slow.bound));
     }
     for (std::size_t i = 0; i < kCount; ++i) {
+      const Twin exact = twin(k, row, i, with_sigma);
+      if (std::isnan(slow.bound[i]) != std::isnan(exact.bound)) {
+        ++on_the_brink;  // single precision may fall on the other side of a limit
+      } else if (!std::isnan(exact.bound)) {
+        EXPECT_NEAR(slow.bound[i], exact.bound, 1e-3 * exact.bound + 1e-4) << trial << ' ' << i;
+        ++bounded;
+      }
       if (slow.state[i] != 0) {
-        EXPECT_TRUE(std::isnan(slow.depth[i]) && std::isnan(slow.variance[i]));
+        EXPECT_TRUE(std::isnan(slow.depth[i]) && std::isnan(slow.variance[i]) &&
+                    std::isnan(slow.own_variance[i]));
         continue;
       }
-      const double z = twin_depth(k, row, i);
-      EXPECT_NEAR(slow.depth[i], z, 2e-5 * z + 1e-6 * z * z) << trial << ' ' << i;
-      EXPECT_GT(slow.variance[i], 0);
+      EXPECT_NEAR(slow.depth[i], exact.z, 2e-5 * exact.z + 1e-6 * exact.z * exact.z) << trial << ' ' << i;
+      EXPECT_GT(slow.own_variance[i], 0);
+      if (k.has_pose) {
+        EXPECT_GE(slow.variance[i], slow.own_variance[i]);
+      } else {
+        EXPECT_EQ(slow.variance[i], slow.own_variance[i]);
+      }
       ++measured;
     }
     for (std::size_t i = 0; i < kCount; ++i) {
@@ -151,9 +230,73 @@ TEST(DepthKernel, EveryInstructionSetGivesTheSameBitsAndAgreesWithItsSlowTwin) {
       if (with_sigma && std::isinf(row.sigma[i])) {
         EXPECT_NE(slow.state[i], 0);
       }
+      if (row.gate[i] != 0 || std::isnan(row.flow[2 * i]) || (with_sigma && std::isinf(row.sigma[i]))) {
+        EXPECT_TRUE(std::isnan(slow.bound[i]));
+      }
+      if (slow.state[i] == 6) {
+        EXPECT_GE(slow.bound[i], k.range);
+      }
     }
   }
   EXPECT_GT(measured, 2500);
+  EXPECT_GT(bounded, 5000);
+  EXPECT_LT(on_the_brink, bounded / 1000);
+}
+
+TEST(DepthKernel, WhatIsLeftOfARotationIsRemovedLikeTheWholeOfIt) {
+  // Flow w of the untouched pair, and the flow that is seen after the other image was turned by `removed`.
+  Random random(17);
+  int measured = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    Row row = random_row(random);
+    KernelParameters exact = random_parameters(random);
+    exact.derotation = KernelDerotation::exact;
+    exact.has_pose = trial % 2 == 1;
+    const Camera camera{0, 0, exact.fx, exact.fy, 0, 0};
+    const Eigen::Matrix3d rotation = rotation_exp(0.03 * random.normal3()).toRotationMatrix();
+    const Eigen::Matrix3d removed = rotation_exp(0.003 * random.normal3()).toRotationMatrix() * rotation;
+    KernelParameters remaining = exact;
+    remaining.derotation = KernelDerotation::remaining;
+    const Eigen::Matrix3d left = rotation * removed.transpose();
+    for (int i = 0; i < 9; ++i) {
+      const double one = i % 4 == 0 ? 1 : 0;
+      exact.turn[i] = static_cast<float>(rotation(i / 3, i % 3) - one);
+      remaining.turn[i] = static_cast<float>(left(i / 3, i % 3) - one);
+      remaining.view[i] = static_cast<float>(removed(i % 3, i / 3) - one);
+    }
+    // Flow that fits depths of 1.5 to 30 m, so that much is measured.
+    Row turned_row = row;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      const Eigen::Vector2d p(row.x[i], row.y);
+      const Eigen::Vector3d t(exact.fx_tx / exact.fx, exact.fy_ty / exact.fy, exact.tz);
+      const double z = random.uniform(1.5, 30);
+      const Eigen::Vector3d point =
+          rotation.transpose() * (z * Eigen::Vector3d(p.x() / camera.fx, p.y() / camera.fy, 1) - t);
+      const Eigen::Vector2d match(camera.fx * point.x() / point.z(), camera.fy * point.y() / point.z());
+      const Eigen::Vector3d direction = removed * point;
+      const Eigen::Vector2d seen(camera.fx * direction.x() / direction.z(),
+                                 camera.fy * direction.y() / direction.z());
+      for (int c = 0; c < 2; ++c) {
+        row.flow[2 * i + static_cast<std::size_t>(c)] = static_cast<float>(match[c] - p[c]);
+        turned_row.flow[2 * i + static_cast<std::size_t>(c)] = static_cast<float>(seen[c] - p[c]);
+      }
+    }
+    const Output a = run(&baseline::depth_row, exact, row, false);
+    const Output b = run(&baseline::depth_row, remaining, turned_row, false);
+    int differ = 0;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      differ += a.state[i] != b.state[i] ? 1 : 0;
+      if (a.state[i] != b.state[i]) continue;
+      if (!std::isnan(a.bound[i]) && !std::isnan(b.bound[i])) {
+        EXPECT_NEAR(a.bound[i], b.bound[i], 1e-2 * a.bound[i]);
+      }
+      if (a.state[i] != 0) continue;
+      ++measured;
+      EXPECT_NEAR(a.depth[i], b.depth[i], 1e-4 * a.depth[i] * a.depth[i] + 1e-4) << trial << ' ' << i;
+    }
+    EXPECT_LT(differ, 10);
+  }
+  EXPECT_GT(measured, 3000);
 }
 
 TEST(DepthKernel, SumsOfFlowAndGradientsAreTheSameInEveryInstructionSet) {

@@ -74,6 +74,42 @@ TEST(TextureGate, ShadingIsNoTextureButFaintTextureThatBothImagesShowIs) {
   EXPECT_LT(blank_pixels(noisy(faint, 2, 1), noisy(faint, 2, 2), {0.1, 0, 0}), 0.05 * kSize.area());
 }
 
+cv::Mat gate_of(const cv::Mat& first, const cv::Mat& second, const RelativeMotion& motion) {
+  return texture_gate(first, second, kStill, kCamera, motion, kLimits, image_noise(first, second, kStill));
+}
+
+TEST(TextureGate, AtTheEpipoleTextureMustRunInEveryDirection) {
+  const RelativeMotion forward = moving({0, 0, 0.2});  // the epipole is the principal point, (80, 41)
+  const cv::Rect epipole(76, 37, 8, 8);
+  const auto blank = [&](const cv::Mat& gate, cv::Rect part) { return cv::countNonZero(gate(part)); };
+  for (const double angle : {0.0, 0.4, 1.1, 1.57}) {
+    const cv::Mat stripes = grating(kSize, 0.5 * std::cos(angle), 0.5 * std::sin(angle));
+    EXPECT_EQ(blank(gate_of(noisy(stripes, 1, 1), noisy(stripes, 1, 2), forward), epipole), epipole.area())
+        << angle;
+  }
+  const cv::Mat stripes = grating(kSize, 0.5, 0);
+  const cv::Mat gate = gate_of(stripes, stripes, forward);
+  EXPECT_EQ(blank(gate, {120, 37, 40, 8}), 0) << "stripes across the line, away from the epipole";
+
+  cv::Mat crossed;
+  cv::addWeighted(stripes, 0.5, grating(kSize, 0.1, 0.5), 0.5, 0, crossed);
+  EXPECT_EQ(blank(gate_of(noisy(crossed, 1, 1), noisy(crossed, 1, 2), forward), epipole), 0);
+  cv::Mat faint;
+  crossed.convertTo(faint, CV_8U, 0.22, 100);  // in noise of 2: seen only in that both images show it
+  EXPECT_EQ(blank(gate_of(noisy(faint, 2, 1), noisy(faint, 2, 2), forward), epipole), 0);
+  const cv::Mat flat(kSize, CV_8UC1, cv::Scalar(120));
+  EXPECT_EQ(blank(gate_of(noisy(flat, 2, 1), noisy(flat, 2, 2), forward), epipole), epipole.area());
+}
+
+TEST(TextureGate, WhereTheEpipoleIsNotKnownTextureMustRunInEveryDirection) {
+  RelativeMotion motion = moving({0, 0, 0.2});
+  motion.covariance.topLeftCorner<3, 3>() = std::pow(0.02, 2) * Eigen::Matrix3d::Identity();
+  const cv::Mat stripes = grating(kSize, 0.5, 0);
+  const cv::Rect beside(100, 37, 12, 8);  // 20 to 32 px from the epipole, which is known to 15 px
+  EXPECT_EQ(cv::countNonZero(gate_of(stripes, stripes, motion)(beside)), beside.area());
+  EXPECT_EQ(cv::countNonZero(gate_of(stripes, stripes, moving({0, 0, 0.2}))(beside)), 0);
+}
+
 TEST(ImageNoise, IsNotChangedByExposureOrByTextureThatTheFlowMatches) {
   const cv::Mat texture = grating(kSize, 0.2, 0.13);
   const cv::Mat first = noisy(texture, 2, 1);
