@@ -389,7 +389,8 @@ TEST(DepthStates, TexturedThingsAtInfinityAreFarAndOverAShortBaselineLowParallax
                                             static_cast<float>(0.2 * random.normal())};
       }
     }
-    const DepthOptions options;
+    DepthOptions options;
+    options.flow_sigma = 0.2;
     const DepthImage depth = DepthEstimator(options).estimate({pair.camera, pair.motion, flow});
     cv::Mat far = cv::Mat::zeros(kCamera.size(), CV_8UC1);
     far.rowRange(0, 60).setTo(255);
