@@ -21,7 +21,7 @@ constexpr std::size_t index_of(DepthState state) { return static_cast<std::size_
 /// 1000 pixels, most of them with depth; 50 frames, 49 pairs.
 io::RunInfo good_run() {
   io::RunInfo info;
-  info.options = R"({"mapper":{"map":{"range":20.0,"hit_max_sigma":0.2}}})";
+  info.options = R"({"mapper":{"map":{"range":20.0,"hit_max_relative_sigma":0.25}}})";
   info.health.frames = 50;
   info.health.frames_used = 50;
   info.health.depth_images = 49;

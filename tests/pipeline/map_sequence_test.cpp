@@ -121,7 +121,7 @@ TEST_F(MapSequence, AGoodRunHasNoHintsAndItsCountsAddUp) {
 
 TEST_F(MapSequence, AnEmptyMapIsSaidEverywhere) {
   MapSequenceOptions options;
-  options.mapper.map.hit_max_sigma = 0;
+  options.mapper.map.hit_max_relative_sigma = 0;
   const auto result = map("run", options);
   ASSERT_TRUE(result) << result.error().message;
   const auto run = io::read_run(root_ / "run");

@@ -105,13 +105,14 @@ KernelParameters kernel_parameters(const DepthInput& input, const DepthOptions& 
   return k;
 }
 
-/// A measured pixel whose match falls on a pixel that the other frame does not see is out of view.
+/// A pixel whose match falls on one that the other frame does not see is out of view, and has no bound.
 void hide_invalid_matches(const DepthInput& input, int n, const FlowField& flow, DepthImage& out) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (int r = 0; r < out.depth.rows; ++r) {
     auto* state = out.state.ptr<std::uint8_t>(r);
+    const auto* bound = out.bound.ptr<float>(r);
     for (int c = 0; c < out.depth.cols; ++c) {
-      if (state[c] != static_cast<std::uint8_t>(DepthState::measured)) continue;
+      if (state[c] != static_cast<std::uint8_t>(DepthState::measured) && std::isnan(bound[c])) continue;
       const auto& w = flow.vectors.at<cv::Vec2f>(r, c);
       double u = cell_centre(c, n) + static_cast<double>(w[0]);
       double v = cell_centre(r, n) + static_cast<double>(w[1]);

@@ -28,51 +28,98 @@ struct Gradients {
   cv::Mat x, y;  // CV_16SC1
 };
 
-/// Mean of (gradient along the epipolar line)^2 per block, each averaged with its eight neighbours.
-cv::Mat energy_along(const Gradients& image, const cv::Mat& directions) {
+// The epipole within this many pixels of a block's centre: the epipolar line has no one direction in its
+// window.
+constexpr double kEpipoleRadius = 2 * kTextureBlock;
+// Where |a| is not this many sigmas of itself, the line may run in any direction (at 2: +-30 degrees).
+constexpr double kDirectionSigmas = 2;
+
+/// Structure tensor per block, mean over its pixels: CV_32FC3 of xx, xy, yy.
+cv::Mat structure_tensors(const Gradients& image, cv::Size blocks) {
   const auto accumulate = PADE_DISPATCH(accumulate_gradients, simd::best());
   const auto width = static_cast<std::size_t>(image.x.cols);
   std::vector<std::int32_t> columns(3 * width);
-  cv::Mat energy(directions.size(), CV_32FC1);
-  for (int r = 0; r < energy.rows; ++r) {
+  cv::Mat tensors(blocks, CV_32FC3);
+  for (int r = 0; r < tensors.rows; ++r) {
     std::fill(columns.begin(), columns.end(), 0);
     const int bottom = std::min(image.x.rows, (r + 1) * kTextureBlock);
     for (int v = r * kTextureBlock; v < bottom; ++v) {
       accumulate(image.x.ptr<std::int16_t>(v), image.y.ptr<std::int16_t>(v), width, columns.data(),
                  columns.data() + width, columns.data() + 2 * width);
     }
-    for (int c = 0; c < energy.cols; ++c) {
+    for (int c = 0; c < tensors.cols; ++c) {
       const int right = std::min(image.x.cols, (c + 1) * kTextureBlock);
-      float xx = 0;
-      float xy = 0;
-      float yy = 0;
+      cv::Vec3f sum(0, 0, 0);
       for (auto u = static_cast<std::size_t>(c * kTextureBlock); u < static_cast<std::size_t>(right); ++u) {
-        xx += static_cast<float>(columns[u]);
-        xy += static_cast<float>(columns[width + u]);
-        yy += static_cast<float>(columns[2 * width + u]);
+        sum += cv::Vec3f(static_cast<float>(columns[u]), static_cast<float>(columns[width + u]),
+                         static_cast<float>(columns[2 * width + u]));
       }
       const int pixels = (bottom - r * kTextureBlock) * (right - c * kTextureBlock);
-      const auto& e = directions.at<cv::Vec2f>(r, c);
-      energy.at<float>(r, c) =
-          (e[0] * e[0] * xx + 2 * e[0] * e[1] * xy + e[1] * e[1] * yy) / static_cast<float>(pixels);
+      tensors.at<cv::Vec3f>(r, c) = sum / static_cast<float>(pixels);
     }
   }
-  cv::blur(energy, energy, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
-  return energy;
+  return tensors;
 }
 
-/// Unit vector along the epipolar line at the centre of each block: CV_32FC2.
-cv::Mat epipolar_directions(const Camera& camera, const RelativeMotion& motion, cv::Size blocks) {
-  cv::Mat directions(blocks, CV_32FC2);
-  for (int r = 0; r < blocks.height; ++r) {
-    for (int c = 0; c < blocks.width; ++c) {
+/// Mean of (gradient along e)^2.
+float energy(const cv::Vec3f& tensor, const cv::Vec2f& e) {
+  return e[0] * e[0] * tensor[0] + 2 * e[0] * e[1] * tensor[1] + e[1] * e[1] * tensor[2];
+}
+
+/// Unit vector in which the gradients are weakest.
+cv::Vec2f weaker_direction(const cv::Vec3f& tensor) {
+  const float angle = 0.5F * std::atan2(2 * tensor[1], tensor[0] - tensor[2]);  // of the stronger one
+  return {-std::sin(angle), std::cos(angle)};
+}
+
+/// In which direction each block must have texture.
+struct Lines {
+  cv::Mat direction;  // CV_32FC2, unit vector along the epipolar line at the centre of each block
+  cv::Mat unknown;  // CV_8UC1, not 0 where there is no such line: `direction` is that of the weakest texture
+};
+
+/// @param tensors  of the windows
+Lines epipolar_lines(const Camera& camera, const RelativeMotion& motion, const cv::Mat& tensors) {
+  const Eigen::Vector3d& t = motion.t_reference_other;
+  const Eigen::Matrix3d covariance = motion.covariance.topLeftCorner<3, 3>();
+  Lines lines{cv::Mat(tensors.size(), CV_32FC2), cv::Mat(tensors.size(), CV_8UC1)};
+  for (int r = 0; r < tensors.rows; ++r) {
+    for (int c = 0; c < tensors.cols; ++c) {
       const Eigen::Vector2d p(cell_centre(c, kTextureBlock) - camera.cx,
                               cell_centre(r, kTextureBlock) - camera.cy);
-      const Eigen::Vector2f e = times_A(camera, p, motion.t_reference_other).normalized().cast<float>();
-      directions.at<cv::Vec2f>(r, c) = {e.x(), e.y()};
+      const Eigen::Vector2d a = times_A(camera, p, t);
+      Eigen::Matrix<double, 2, 3> A;
+      A << camera.fx, 0, -p.x(), 0, camera.fy, -p.y();
+      const double variance = (A * covariance * A.transpose()).trace();
+      const double least =
+          std::max(kEpipoleRadius * std::abs(t.z()), kDirectionSigmas * std::sqrt(std::max(0.0, variance)));
+      const bool unknown = !(a.norm() > least);
+      lines.unknown.at<std::uint8_t>(r, c) = unknown ? 255 : 0;
+      const Eigen::Vector2f e = a.normalized().cast<float>();
+      lines.direction.at<cv::Vec2f>(r, c) =
+          unknown ? weaker_direction(tensors.at<cv::Vec3f>(r, c)) : cv::Vec2f(e.x(), e.y());
     }
   }
-  return directions;
+  return lines;
+}
+
+/// Mean of (gradient along the epipolar line)^2 of each block and its eight neighbours.
+/// @param own, windows  tensors of the blocks, and averaged with those around
+cv::Mat energy_along(const Lines& lines, const cv::Mat& own, const cv::Mat& windows) {
+  cv::Mat along(own.size(), CV_32FC1);
+  for (int r = 0; r < own.rows; ++r) {
+    for (int c = 0; c < own.cols; ++c) {
+      along.at<float>(r, c) = energy(own.at<cv::Vec3f>(r, c), lines.direction.at<cv::Vec2f>(r, c));
+    }
+  }
+  cv::blur(along, along, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
+  for (int r = 0; r < own.rows; ++r) {
+    for (int c = 0; c < own.cols; ++c) {
+      if (lines.unknown.at<std::uint8_t>(r, c) == 0) continue;
+      along.at<float>(r, c) = energy(windows.at<cv::Vec3f>(r, c), lines.direction.at<cv::Vec2f>(r, c));
+    }
+  }
+  return along;
 }
 
 /// 1, a, b, aa, bb, ab over the matched pixels of a block: a and b are the gradients along the epipolar line
@@ -96,6 +143,19 @@ cv::Vec6f block_sums(const Gradients& first, const Gradients& second, const Flow
     }
   }
   return sum;
+}
+
+/// The same, mean over a block and its neighbours with one direction.
+cv::Vec6f window_sums(const Gradients& first, const Gradients& second, const FlowField& flow, cv::Size blocks,
+                      int r, int c, const cv::Vec2f& e) {
+  cv::Vec6f sum = cv::Vec6f::all(0);
+  for (int dr = -1; dr <= 1; ++dr) {
+    for (int dc = -1; dc <= 1; ++dc) {
+      sum += block_sums(first, second, flow, std::clamp(r + dr, 0, blocks.height - 1),
+                        std::clamp(c + dc, 0, blocks.width - 1), e);
+    }
+  }
+  return sum / 9.0F;
 }
 
 /// Correlation of a and b; 0 where either does not vary beyond rounding or little was matched.
@@ -164,9 +224,12 @@ cv::Mat texture_gate(const cv::Mat& reference, const cv::Mat& other, const FlowF
   const Gradients first(reference);
   const cv::Size blocks((reference.cols + kTextureBlock - 1) / kTextureBlock,
                         (reference.rows + kTextureBlock - 1) / kTextureBlock);
-  const cv::Mat directions = epipolar_directions(camera, motion, blocks);
+  const cv::Mat tensors = structure_tensors(first, blocks);
+  cv::Mat windows;
+  cv::blur(tensors, windows, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
+  const Lines lines = epipolar_lines(camera, motion, windows);
   const cv::Mat weak =
-      energy_along(first, directions) < std::pow(limits.strong * kSobelSum * kSobelNoise * noise, 2);
+      energy_along(lines, tensors, windows) < std::pow(limits.strong * kSobelSum * kSobelNoise * noise, 2);
 
   // Only weak blocks need a second look; their windows reach into the blocks around them.
   cv::Mat sums(blocks, CV_32FC(6), cv::Scalar::all(0));
@@ -177,10 +240,17 @@ cv::Mat texture_gate(const cv::Mat& reference, const cv::Mat& other, const FlowF
     for (int r = 0; r < blocks.height; ++r) {
       for (int c = 0; c < blocks.width; ++c) {
         if (around.at<std::uint8_t>(r, c) == 0) continue;
-        sums.at<cv::Vec6f>(r, c) = block_sums(first, second, flow, r, c, directions.at<cv::Vec2f>(r, c));
+        sums.at<cv::Vec6f>(r, c) = block_sums(first, second, flow, r, c, lines.direction.at<cv::Vec2f>(r, c));
       }
     }
     cv::blur(sums, sums, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
+    for (int r = 0; r < blocks.height; ++r) {
+      for (int c = 0; c < blocks.width; ++c) {
+        if (weak.at<std::uint8_t>(r, c) == 0 || lines.unknown.at<std::uint8_t>(r, c) == 0) continue;
+        sums.at<cv::Vec6f>(r, c) =
+            window_sums(first, second, flow, blocks, r, c, lines.direction.at<cv::Vec2f>(r, c));
+      }
+    }
   }
 
   cv::Mat gate(reference.size(), CV_8UC1);

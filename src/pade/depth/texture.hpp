@@ -30,6 +30,8 @@ struct TextureLimits {
 /// it is not clearly above that of noise, and the gradients of the two matched images are not correlated
 /// either. Correlation is that of the deviations from the window's mean, so that shading, which looks the
 /// same everywhere, does not count.
+/// Around the epipole, and where the motion's covariance leaves its place open, flow in any direction may be
+/// parallax: a block there is judged by its weakest gradient (smaller eigenvalue of the structure tensor).
 /// @param reference, other  CV_8UC1, one size, at least 3 x 3. @param flow  from reference to other.
 /// @param noise  image_noise(). @return CV_8UC1 of that size: 0 or DepthState::no_texture.
 cv::Mat texture_gate(const cv::Mat& reference, const cv::Mat& other, const FlowField& flow,
