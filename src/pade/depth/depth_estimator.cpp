@@ -208,6 +208,10 @@ void average(const FlowField& flow, const cv::Mat& gate, int n, double sigma, st
 
 void DepthEstimator::make_gate(const DepthInput& input) {
   const cv::Size size = input.flow.vectors.size();
+  if (!input.texture.empty()) {
+    if (input.texture.data != gate_.data) input.texture.copyTo(gate_);
+    return;
+  }
   diagnostics_.image_noise = 0;
   const bool judge = options_.gates == Gates::on && options_.texture_gate > 0 && !input.reference.empty() &&
                      size.width >= 3 && size.height >= 3;

@@ -30,6 +30,10 @@ struct DepthInput {
   /// motion.R_reference_other: the motion was refined since.
   std::optional<Eigen::Matrix3d> rotation_removed{};
 
+  /// CV_8UC1, DepthEstimator::gate() of an earlier pair with the same reference and nearly the same direction
+  /// of motion, to be used again; empty = it is made.
+  cv::Mat texture{};
+
   /// Directions: what the other image was turned by before matching.
   [[nodiscard]] Eigen::Matrix3d R_removed() const {
     if (derotation == Derotation::flow) return Eigen::Matrix3d::Identity();
@@ -70,6 +74,8 @@ class DepthEstimator {
   }
 
   [[nodiscard]] const DepthOptions& options() const { return options_; }
+  /// Per pixel of the last estimate(): 0, or the state that image and mask force on it.
+  [[nodiscard]] const cv::Mat& gate() const { return gate_; }
   /// Of the last estimate().
   [[nodiscard]] const DepthDiagnostics& diagnostics() const { return diagnostics_; }
 

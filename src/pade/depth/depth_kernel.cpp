@@ -89,13 +89,9 @@ struct PoseEffect {
 template <KernelDerotation kDerotation, bool kSamelson, bool kSigma, bool kPose>
 void row(const KernelParameters& parameters, const float* __restrict x_of, const float y,
          const float* __restrict flow, const float* __restrict sigma, const std::uint8_t* __restrict gate,
-         std::size_t count, const DepthRow& out) {
+         std::size_t count, float* __restrict depth, float* __restrict variance,
+         float* __restrict own_variance, float* __restrict bounds, std::uint8_t* __restrict state) {
   const KernelParameters k = parameters;  // a copy that no store through the outputs can change
-  float* __restrict const depth = out.depth;
-  float* __restrict const variance = out.variance;
-  float* __restrict const own_variance = out.own_variance;
-  float* __restrict const bounds = out.bound;
-  std::uint8_t* __restrict const state = out.state;
   const float nan = __builtin_nanf("");
   for (std::size_t i = 0; i < count; ++i) {
     const float x = x_of[i];
@@ -225,13 +221,17 @@ void depth_row(const KernelParameters& k, const float* x, float y, const float* 
                const std::uint8_t* gate, std::size_t count, const DepthRow& out) {
   switch (k.derotation) {
     case KernelDerotation::none:
-      return choose_reading<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, out);
+      return choose_reading<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, out.depth,
+                                                    out.variance, out.own_variance, out.bound, out.state);
     case KernelDerotation::exact:
-      return choose_reading<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, out);
+      return choose_reading<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, out.depth,
+                                                     out.variance, out.own_variance, out.bound, out.state);
     case KernelDerotation::first_order:
-      return choose_reading<KernelDerotation::first_order>(k, x, y, flow, sigma, gate, count, out);
+      return choose_reading<KernelDerotation::first_order>(
+          k, x, y, flow, sigma, gate, count, out.depth, out.variance, out.own_variance, out.bound, out.state);
     case KernelDerotation::remaining:
-      return choose_reading<KernelDerotation::remaining>(k, x, y, flow, sigma, gate, count, out);
+      return choose_reading<KernelDerotation::remaining>(
+          k, x, y, flow, sigma, gate, count, out.depth, out.variance, out.own_variance, out.bound, out.state);
   }
 }
 

@@ -1,14 +1,12 @@
 #include "pade/depth/pair_fusion.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace pade::depth {
 namespace {
 
 constexpr float kAgreementSigmas2 = 25;  // (5 sigma)^2 of the difference of inverse depths
-constexpr float kAgreement = 0.1F;       // and of the depth itself: systematic errors are not in sigma
+constexpr float kAgreement = 0.1F;       // share of the farther depth: systematic errors are not in sigma
 
 /// Row pointers of the planes of a depth image.
 struct Row {
@@ -25,52 +23,45 @@ struct Row {
   std::uint8_t* state;
 };
 
+/// Whether two depths agree. False where either is NaN. Multiplied out: a division costs more than the rest.
 bool agree(float z1, float variance1, float z2, float variance2) {
-  const float difference = std::abs(1 / z1 - 1 / z2);
-  const float z1_4 = z1 * z1 * z1 * z1;
-  const float z2_4 = z2 * z2 * z2 * z2;
-  return difference * difference <= kAgreementSigmas2 * (variance1 / z1_4 + variance2 / z2_4) ||
-         difference * std::min(z1, z2) <= kAgreement;
+  const float product = z1 * z2;
+  const float difference = (z1 - z2) * (z1 - z2);
+  const float square1 = z1 * z1;
+  const float square2 = z2 * z2;
+  const float sigmas = kAgreementSigmas2 * (variance1 * square2 * square2 + variance2 * square1 * square1);
+  const float largest = square1 > square2 ? square1 : square2;
+  return (difference * product * product <= sigmas) | (difference <= kAgreement * kAgreement * largest);
 }
-
-/// NaN where either says nothing.
-float nearer(float a, float b) { return std::isnan(a) || std::isnan(b) ? a + b : std::min(a, b); }
 
 }  // namespace
 
 void fuse_pairs(const DepthImage& shorter, DepthImage& longer) {
   constexpr auto kMeasured = static_cast<std::uint8_t>(DepthState::measured);
+  constexpr auto kInconsistent = static_cast<std::uint8_t>(DepthState::inconsistent);
+  constexpr auto kOutOfView = static_cast<std::uint8_t>(DepthState::out_of_view);
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (int v = 0; v < longer.depth.rows; ++v) {
     const Row s(shorter, v);
     const Row l(longer, v);
     for (int u = 0; u < longer.depth.cols; ++u) {
+      const float s_bound = s.bound[u];
+      const float l_bound = l.bound[u];
       const bool has_short = s.state[u] == kMeasured;
       const bool has_long = l.state[u] == kMeasured;
-      if (has_short && has_long) {
-        if (agree(s.depth[u], s.own_variance[u], l.depth[u], l.own_variance[u])) continue;
-        l.state[u] = static_cast<std::uint8_t>(DepthState::inconsistent);
-        l.depth[u] = l.variance[u] = l.own_variance[u] = nan;
-        l.bound[u] = nearer(s.bound[u], l.bound[u]);
-      } else if (has_short) {
-        l.state[u] = s.state[u];
-        l.depth[u] = s.depth[u];
-        l.variance[u] = s.variance[u];
-        l.own_variance[u] = s.own_variance[u];
-        l.bound[u] = s.bound[u];
-      } else if (has_long) {
-        // What the shorter baseline contradicts, or could not see, started from a guess.
-        const bool contradicted = s.state[u] == static_cast<std::uint8_t>(DepthState::inconsistent) ||
-                                  s.state[u] == static_cast<std::uint8_t>(DepthState::out_of_view) ||
-                                  l.depth[u] < s.bound[u];
-        if (!contradicted) continue;
-        l.state[u] = static_cast<std::uint8_t>(DepthState::inconsistent);
-        l.depth[u] = l.variance[u] = l.own_variance[u] = nan;
-        l.bound[u] = nearer(s.bound[u], l.bound[u]);
-      } else if (std::isnan(l.bound[u]) || s.bound[u] > l.bound[u]) {
-        l.state[u] = s.state[u];
-        l.bound[u] = s.bound[u];
-      }
+      // What the shorter baseline contradicts, or could not see, started from a guess.
+      const bool contradicted =
+          (s.state[u] == kInconsistent) | (s.state[u] == kOutOfView) | (l.depth[u] < s_bound);
+      const bool agreed = agree(s.depth[u], s.own_variance[u], l.depth[u], l.own_variance[u]);
+      const bool keeps = has_long & (has_short ? agreed : !contradicted);
+      const bool drops = has_long & !keeps;
+      const bool takes = (!has_long) & (has_short | (l_bound != l_bound) | (s_bound > l_bound));
+      const float nearer = s_bound < l_bound ? s_bound : (l_bound <= s_bound ? l_bound : nan);
+      l.depth[u] = keeps ? l.depth[u] : (takes ? s.depth[u] : nan);
+      l.variance[u] = keeps ? l.variance[u] : (takes ? s.variance[u] : nan);
+      l.own_variance[u] = keeps ? l.own_variance[u] : (takes ? s.own_variance[u] : nan);
+      l.bound[u] = takes ? s_bound : (drops ? nearer : l_bound);
+      l.state[u] = takes ? s.state[u] : (drops ? kInconsistent : l.state[u]);
     }
   }
 }

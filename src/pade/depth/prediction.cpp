@@ -1,7 +1,7 @@
 #include "pade/depth/prediction.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <opencv2/imgproc.hpp>
 
@@ -25,6 +25,65 @@ struct Reach {
 cv::Vec2f within(float u, float v, float largest) {
   const bool usable = std::abs(u) <= largest && std::abs(v) <= largest;  // false for NaN
   return usable ? cv::Vec2f(u, v) : cv::Vec2f(0, 0);
+}
+
+constexpr int kCoarse = 4;  // px of the image per pixel of the foretold depth
+
+/// The camera that sees blocks of kCoarse pixels as its pixels.
+Camera coarse(const Camera& camera) {
+  Camera c = camera;
+  c.width = (camera.width + kCoarse - 1) / kCoarse;
+  c.height = (camera.height + kCoarse - 1) / kCoarse;
+  c.fx /= kCoarse;
+  c.fy /= kCoarse;
+  c.cx = (camera.cx + 0.5) / kCoarse - 0.5;
+  c.cy = (camera.cy + 0.5) / kCoarse - 0.5;
+  return c;
+}
+
+/// Inverse depth on the pixels of `seen_by`, of every fourth pixel of another frame: the nearest where
+/// several fall together, 0 where none does.
+cv::Mat moved_inverse_depth(const cv::Mat& depth, const Camera& camera, const Pose& T_to_from,
+                            const Camera& seen_by) {
+  const Eigen::Matrix3f R = T_to_from.matrix3().cast<float>();
+  const Eigen::Vector3f t = T_to_from.translation.cast<float>();
+  const auto fx = static_cast<float>(seen_by.fx);
+  const auto fy = static_cast<float>(seen_by.fy);
+  const float cx = static_cast<float>(seen_by.cx) + 0.5F;
+  const float cy = static_cast<float>(seen_by.cy) + 0.5F;
+  const float per_fx = 1 / static_cast<float>(camera.fx);
+  const float per_fy = 1 / static_cast<float>(camera.fy);
+  cv::Mat moved(seen_by.height, seen_by.width, CV_32FC1, cv::Scalar(0));
+  for (int v = kCoarse / 2; v < depth.rows; v += kCoarse) {
+    const auto* z = depth.ptr<float>(v);
+    const Eigen::Vector3f row = R * Eigen::Vector3f(0, (static_cast<float>(v - camera.cy)) * per_fy, 1);
+    for (int u = kCoarse / 2; u < depth.cols; u += kCoarse) {
+      if (!(z[u] > 0)) continue;
+      const Eigen::Vector3f p = z[u] * (row + R.col(0) * (static_cast<float>(u - camera.cx) * per_fx)) + t;
+      if (!(p.z() > 0.05F)) continue;
+      const float rho = 1 / p.z();
+      const float x = fx * p.x() * rho + cx;
+      const float y = fy * p.y() * rho + cy;
+      const bool inside =
+          x >= 0 && y >= 0 && x < static_cast<float>(moved.cols) && y < static_cast<float>(moved.rows);
+      if (!inside) continue;
+      auto& nearest = moved.at<float>(static_cast<int>(y), static_cast<int>(x));
+      nearest = std::max(nearest, rho);
+    }
+  }
+  return moved;
+}
+
+/// Where nothing is known: the mean of what is known of the 9 x 9 pixels around.
+void fill(cv::Mat& rho) {
+  constexpr int kReach = 9;
+  const cv::Mat unknown = rho == 0;
+  cv::Mat known;
+  cv::Mat(~unknown).convertTo(known, CV_32F, 1.0 / 255);
+  cv::Mat sum;
+  cv::boxFilter(rho, sum, CV_32F, {kReach, kReach}, {-1, -1}, false, cv::BORDER_CONSTANT);
+  cv::boxFilter(known, known, CV_32F, {kReach, kReach}, {-1, -1}, false, cv::BORDER_CONSTANT);
+  cv::Mat(sum / cv::max(known, 1)).copyTo(rho, unknown);
 }
 
 }  // namespace
@@ -58,71 +117,29 @@ cv::Mat predict_flow(const cv::Mat& flow, const Camera& camera, const RelativeMo
   return out;
 }
 
-cv::Mat filled_depth(const cv::Mat& depth) {
-  constexpr int kReach = 31;                         // px
-  const cv::Mat unknown = ~cv::Mat(depth == depth);  // NaN != NaN is false in OpenCV
-  cv::Mat rho = 1 / depth;
-  rho.setTo(0, unknown);
-  cv::Mat known(depth.size(), CV_32FC1, cv::Scalar(1));
-  known.setTo(0, unknown);
-  cv::boxFilter(rho, rho, CV_32F, {kReach, kReach}, {-1, -1}, false, cv::BORDER_CONSTANT);
-  cv::boxFilter(known, known, CV_32F, {kReach, kReach}, {-1, -1}, false, cv::BORDER_CONSTANT);
-  cv::Mat filled = depth.clone();
-  cv::Mat(known / rho).copyTo(filled, unknown & (known > 0.5F));
-  return filled;
-}
-
-cv::Mat flow_of_depth(const cv::Mat& depth, const Camera& camera, const RelativeMotion& motion) {
-  const Reach a(camera, motion.t_reference_other);
-  const auto cx = static_cast<float>(camera.cx);
-  const auto cy = static_cast<float>(camera.cy);
+cv::Mat foretell_flow(const cv::Mat& depth, const Camera& camera, const Pose& T_reference_frame,
+                      const RelativeMotion& motion) {
+  const Camera seen_by = coarse(camera);
+  cv::Mat rho = moved_inverse_depth(depth, camera, T_reference_frame, seen_by);
+  fill(rho);
+  const Reach a(seen_by, motion.t_reference_other);
+  const auto cx = static_cast<float>(seen_by.cx);
+  const auto cy = static_cast<float>(seen_by.cy);
   const auto largest = static_cast<float>(camera.width);
-  cv::Mat out(depth.size(), CV_32FC2);
-  for (int v = 0; v < depth.rows; ++v) {
-    const auto* z = depth.ptr<float>(v);
-    auto* row = out.ptr<cv::Vec2f>(v);
+  cv::Mat flow(rho.size(), CV_32FC2);
+  for (int v = 0; v < rho.rows; ++v) {
+    const auto* r = rho.ptr<float>(v);
+    auto* row = flow.ptr<cv::Vec2f>(v);
     const float ay = a.y(static_cast<float>(v) - cy);
-    for (int u = 0; u < depth.cols; ++u) {
-      const float scale = z[u] > a.tz ? 1 / (z[u] - a.tz) : 0.0F;
+    for (int u = 0; u < rho.cols; ++u) {
+      const float nearness = 1 - r[u] * a.tz;  // D = a / (Z - t_z)
+      const float scale = nearness > 0 ? kCoarse * r[u] / nearness : 0.0F;
       row[u] = within(a.x(static_cast<float>(u) - cx) * scale, ay * scale, largest);
     }
   }
-  return out;
-}
-
-cv::Mat reproject_depth(const cv::Mat& depth, const Camera& camera, const Pose& T_to_from) {
-  const float infinity = std::numeric_limits<float>::infinity();
-  const Eigen::Matrix3f R = T_to_from.matrix3().cast<float>();
-  const Eigen::Vector3f t = T_to_from.translation.cast<float>();
-  const auto fx = static_cast<float>(camera.fx);
-  const auto fy = static_cast<float>(camera.fy);
-  const auto cx = static_cast<float>(camera.cx);
-  const auto cy = static_cast<float>(camera.cy);
-  cv::Mat moved(depth.size(), CV_32FC1, cv::Scalar(infinity));
-  for (int v = 0; v < depth.rows; ++v) {
-    const auto* z = depth.ptr<float>(v);
-    const float ry = (static_cast<float>(v) - cy) / fy;
-    for (int u = 0; u < depth.cols; ++u) {
-      if (!(z[u] > 0)) continue;
-      const float rx = (static_cast<float>(u) - cx) / fx;
-      const Eigen::Vector3f p = z[u] * (R * Eigen::Vector3f(rx, ry, 1)) + t;
-      if (!(p.z() > 0.05F)) continue;
-      const float x = fx * p.x() / p.z() + cx + 0.5F;
-      const float y = fy * p.y() / p.z() + cy + 0.5F;
-      const bool inside =
-          x >= 0 && y >= 0 && x < static_cast<float>(depth.cols) && y < static_cast<float>(depth.rows);
-      if (!inside) continue;
-      auto& nearest = moved.at<float>(static_cast<int>(y), static_cast<int>(x));
-      nearest = std::min(nearest, p.z());
-    }
-  }
-  // A surface that comes nearer grows, and its pixels part: the nearest neighbour fills what is between them.
-  cv::Mat grown;
-  cv::erode(moved, grown, cv::Mat());
-  cv::Mat filled = moved.clone();
-  grown.copyTo(filled, moved == infinity);
-  filled.setTo(std::numeric_limits<float>::quiet_NaN(), filled == infinity);
-  return filled;
+  cv::Mat full;
+  cv::resize(flow, full, {}, kCoarse, kCoarse, cv::INTER_NEAREST);
+  return cv::Mat(full, cv::Rect(0, 0, camera.width, camera.height)).clone();
 }
 
 }  // namespace pade::depth

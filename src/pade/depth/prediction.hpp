@@ -20,18 +20,12 @@ namespace pade::depth {
 cv::Mat predict_flow(const cv::Mat& flow, const Camera& camera, const RelativeMotion& from,
                      const RelativeMotion& to);
 
-/// A guess where nothing is known: the mean of 1/Z over the known of the 31 x 31 pixels around.
-/// @param depth  CV_32FC1, m; NaN = none. @return the same with its holes filled; NaN where all around is one
-cv::Mat filled_depth(const cv::Mat& depth);
-
-/// Derotated flow that a depth image of the reference foretells for a pair: D = a / (Z - t_z).
-/// @param depth  CV_32FC1, m; NaN = none. @return as predict_flow().
-cv::Mat flow_of_depth(const cv::Mat& depth, const Camera& camera, const RelativeMotion& motion);
-
-/// The depth image of one frame as another one sees it: each pixel moved to where its point is seen, the
-/// nearest where several fall together; holes of a pixel take the nearest of their neighbours.
-/// @param depth  CV_32FC1 of `from`, m; NaN = none. @param T_to_from  pose of that camera in the other.
-/// @return CV_32FC1, m; NaN where nothing is known
-cv::Mat reproject_depth(const cv::Mat& depth, const Camera& camera, const Pose& T_to_from);
+/// Derotated flow that the depth image of another frame foretells for a pair, as a start for matching: coarse
+/// (every fourth pixel is looked at), with its holes filled from what is near them.
+/// @param depth        CV_32FC1 of that frame, m; NaN = none
+/// @param T_reference_frame  pose of that frame's camera in the reference
+/// @param motion       of the pair. @return as predict_flow(), on the reference's pixels
+cv::Mat foretell_flow(const cv::Mat& depth, const Camera& camera, const Pose& T_reference_frame,
+                      const RelativeMotion& motion);
 
 }  // namespace pade::depth

@@ -266,9 +266,7 @@ cv::Mat ObstacleMapper::foretold_flow(const RelativeMotion& motion) const {
   if (!asks || update_.depth.empty() || update_.depth.time != recent_.back().frame.time) return {};
   const Pose T_newest_last{Eigen::Quaterniond(motion.R_reference_other).normalized(),
                            motion.t_reference_other};
-  const cv::Mat depth =
-      depth::filled_depth(depth::reproject_depth(update_.depth.depth, camera_, T_newest_last));
-  return depth::flow_of_depth(depth, camera_, motion);
+  return depth::foretell_flow(update_.depth.depth, camera_, T_newest_last, motion);
 }
 
 /// Removes the rotation, so that flow is parallax alone, and calculates it.
@@ -342,6 +340,7 @@ void ObstacleMapper::estimate_depth(const Pair& pair, const Frame& reference,
                           reference.image, pair.seen,   valid_};
   const bool refined = update_.refinement.outcome == depth::RefinementOutcome::refined;
   if (refined && removed) input.rotation_removed = *removed;
+  if (!removed) input.texture = depth_.gate();  // of the first pair: the same image, and much the same lines
   depth_.estimate(input, out);
   update_.diagnostics = depth_.diagnostics();
 }
