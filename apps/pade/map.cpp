@@ -166,7 +166,7 @@ void run(const MapArguments& arguments, Context& context) {
 void add_pipeline_options(CLI::App& map, MapArguments& a) {
   std::vector<std::string> methods = flow::flow_estimator_names();
   methods.emplace_back("dis");
-  map.add_option("--flow", a.flow, "optical-flow method (default clg-fast); dis = dis-medium")
+  map.add_option("--flow", a.flow, "optical-flow method (default clg-fast-half); dis = dis-medium")
       ->check(CLI::IsMember(methods));
   add_enum(map, "--depth", a.method,
            "depth from the pose (pade, the default) or from time to collision (ttc)");

@@ -77,7 +77,7 @@ TEST(Voxels, BelongToTheUpperNeighbourOnTheirFaces) {
   EXPECT_TRUE(box_of({3, 0, 0}, 0.1).contains(Vector3d(0.3, 0.05, 0.05)));
 }
 
-/// The voxels of the wall that a pixel's ray goes through, or passes within half a voxel: counted by hand.
+/// The voxels of the wall in which a pixel's ray ends: counted by hand.
 TEST(SeenSurface, OfAWallIsOneLayerOfVoxels) {
   const Camera camera = small_camera();
   SeenSurface seen(kSide, 8);
@@ -87,10 +87,20 @@ TEST(SeenSurface, OfAWallIsOneLayerOfVoxels) {
   // Rays end at y = (39.5 - u) / 70 * 3.03 and z = (29.5 - v) / 70 * 3.03: 4.3 cm apart, none is left out.
   const double y = 39.5 / 70 * kWall;
   const double z = 29.5 / 70 * kWall;
-  const int wide = static_cast<int>(std::floor((y + 0.05) / kSide) - std::floor((-y - 0.05) / kSide)) + 1;
-  const int high = static_cast<int>(std::floor((z + 0.05) / kSide) - std::floor((-z - 0.05) / kSide)) + 1;
+  const int wide = static_cast<int>(std::floor((y + 0.001) / kSide) - std::floor((-y - 0.001) / kSide)) + 1;
+  const int high = static_cast<int>(std::floor((z + 0.001) / kSide) - std::floor((-z - 0.001) / kSide)) + 1;
   EXPECT_EQ(voxels.size(), static_cast<std::size_t>(wide * high));
   for (const Voxel& voxel : voxels) EXPECT_EQ(voxel[0], 30);
+}
+
+/// The far side of a board of 6 cm lies in the next voxel, and nobody sees it.
+TEST(SeenSurface, HasNothingThatIsHidden) {
+  SeenSurface seen(kSide, 8);
+  seen.add(flat_depth(2.97), small_camera(), looking_along_x());
+  const Surface far_side = wall_at(3.03);
+  EXPECT_TRUE(seen.voxels(PlacedSurface(far_side)).empty());
+  const Surface near_side = wall_at(2.97);
+  EXPECT_FALSE(seen.voxels(PlacedSurface(near_side)).empty());
 }
 
 TEST(SeenSurface, EndsAtItsDepthAndHasNoNaN) {

@@ -1,5 +1,6 @@
 #include "pade/evaluation/rigid_alignment.hpp"
 
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -54,7 +55,7 @@ TEST(RigidAlignment, HoldsForAHoveringCamera) {
 TEST(RigidAlignment, IsTheLeastOfItsSum) {
   std::mt19937 engine(3);
   std::normal_distribution<double> noise(0, 1);
-  const auto three = [&](double scale) {
+  const auto three = [&](double scale) -> Eigen::Vector3d {
     return Eigen::Vector3d(noise(engine), noise(engine), noise(engine)) * scale;
   };
   const std::vector<Pose> truth = straight_flight();

@@ -2,13 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <iterator>
+#include <utility>
 
 namespace pade::evaluation {
 namespace {
 
 using mapping::Occupancy;
 using mapping::OccupancyMap;
+
+/// Nearer to a face of a voxel than this, rounding and the chords of round shapes say which side a point is
+/// on.
+constexpr double kOnFace = 1e-3;  // metres
 
 void sort_unique(std::vector<Voxel>& voxels) {
   std::sort(voxels.begin(), voxels.end());
@@ -43,7 +48,6 @@ bool any_neighbour_occupied(const OccupancyMap& map, const Voxel& voxel, double 
 
 /// The state of a voxel that holds surface, with that of the neighbours on whose face the surface lies.
 Occupancy state_of(const OccupancyMap& map, const Voxel& voxel, const PlacedSurface& surface) {
-  constexpr double kOnFace = 1e-3;  // metres
   const double side = map.options().voxel;
   const Eigen::AlignedBox3d box = box_of(voxel, side);
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kOnFace);
@@ -106,30 +110,35 @@ Eigen::AlignedBox3d box_of(const Voxel& voxel, double side) {
 
 void SeenSurface::add(const cv::Mat& exact_depth, const Camera& camera, const Pose& T_map_camera) {
   const PixelPoints pixels(camera, T_map_camera);
-  std::vector<Voxel> blocks;
+  const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(kOnFace);
+  std::vector<Voxel> seen;
+  const auto add = [&](const Voxel& voxel) {
+    if (seen.empty() || seen.back() != voxel) seen.push_back(voxel);
+  };
   for (int v = 0; v < exact_depth.rows; ++v) {
     const auto* depth = exact_depth.ptr<float>(v);
     for (int u = 0; u < exact_depth.cols; ++u) {
       if (!(depth[u] > 0 && depth[u] <= farthest_)) continue;
       const Eigen::Vector3d point = pixels.point(pixels.ray(u, v), depth[u]);
-      const Voxel block = voxel_at(point - Eigen::Vector3d::Constant(0.5 * side_), side_);
-      if (blocks.empty() || blocks.back() != block) blocks.push_back(block);
+      const Voxel low = voxel_at(point - rounding, side_);
+      const Voxel high = voxel_at(point + rounding, side_);
+      add(low);
+      if (low == high) continue;
+      for (int i = 1; i < 8; ++i) {
+        add({i % 2 != 0 ? high[0] : low[0], i / 2 % 2 != 0 ? high[1] : low[1],
+             i / 4 != 0 ? high[2] : low[2]});
+      }
     }
   }
-  sort_unique(blocks);
+  sort_unique(seen);
   std::vector<Voxel> both;
-  both.reserve(blocks_.size() + blocks.size());
-  std::set_union(blocks_.begin(), blocks_.end(), blocks.begin(), blocks.end(), std::back_inserter(both));
-  blocks_ = std::move(both);
+  both.reserve(voxels_.size() + seen.size());
+  std::set_union(voxels_.begin(), voxels_.end(), seen.begin(), seen.end(), std::back_inserter(both));
+  voxels_ = std::move(both);
 }
 
 std::vector<Voxel> SeenSurface::voxels(const PlacedSurface& surface) const {
-  std::vector<Voxel> voxels;
-  voxels.reserve(8 * blocks_.size());
-  for (const Voxel& block : blocks_) {
-    for (int i = 0; i < 8; ++i) voxels.push_back({block[0] + i % 2, block[1] + i / 2 % 2, block[2] + i / 4});
-  }
-  sort_unique(voxels);
+  std::vector<Voxel> voxels = voxels_;
   std::erase_if(voxels, [&](const Voxel& voxel) { return !surface.overlaps(box_of(voxel, side_)); });
   return voxels;
 }

@@ -23,8 +23,7 @@ Voxel voxel_at(const Eigen::Vector3d& point, double side);
 Eigen::Vector3d centre_of(const Voxel& voxel, double side);
 Eigen::AlignedBox3d box_of(const Voxel& voxel, double side);
 
-/// Which voxels the cameras saw surface in: those that hold the exact point of a pixel, or have one within
-/// half a voxel along every axis.
+/// Which voxels the cameras saw surface in: those in which the exact point of a pixel lies, to a millimetre.
 class SeenSurface {
  public:
   /// @param side      of a voxel of the map, m
@@ -41,8 +40,7 @@ class SeenSurface {
  private:
   double side_;
   double farthest_;
-  // Lower corners, in half-shifted voxels, of the blocks of 2 x 2 x 2 voxels about each point; rising.
-  std::vector<Voxel> blocks_;
+  std::vector<Voxel> voxels_;  // rising
 };
 
 /// What the map says of voxels that hold surface.

@@ -149,6 +149,12 @@ ClgOptions clg_half_options() {
   return options;
 }
 
+ClgOptions clg_guide_options() {
+  ClgOptions options = clg_half_options();
+  options.warps = 2;
+  return options;
+}
+
 ClgOptions clg_accurate_options() {
   ClgOptions options;
   options.warps = 4;

@@ -49,6 +49,8 @@ struct ClgOptions {
 
 ClgOptions clg_fast_options();
 ClgOptions clg_half_options();
+/// Half size and half the warps: flow that another one starts from.
+ClgOptions clg_guide_options();
 ClgOptions clg_accurate_options();
 ClgOptions clg_linear_options();
 

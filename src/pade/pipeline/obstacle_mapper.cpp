@@ -9,6 +9,7 @@
 #include "pade/depth/derotation.hpp"
 #include "pade/depth/pair_fusion.hpp"
 #include "pade/depth/prediction.hpp"
+#include "pade/flow/clg.hpp"
 
 namespace pade {
 namespace {
@@ -128,28 +129,30 @@ Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const Obstac
   auto flow = flow::make_flow_estimator(
       options.flow, two ? flow_options(kGuidedLevel, flow::InitialFlow::replaces) : first);
   if (!flow) return flow.error();
-  auto first_flow = flow::make_flow_estimator(options.first_flow, first);
-  if (!first_flow) return first_flow.error();
+  flow::ClgOptions guide = flow::clg_guide_options();
+  const bool half = guide.pyramid.half_resolution;
+  guide.pyramid = first;
+  guide.pyramid.half_resolution = half;
   auto map = mapping::OccupancyMap::create(options.map);
   if (!map) return map.error();
-  return ObstacleMapper(camera, options, valid, std::move(flow).value(), std::move(first_flow).value(),
+  return ObstacleMapper(camera, options, valid, std::move(flow).value(), flow::make_clg(guide, "clg-guide"),
                         std::move(map).value());
 }
 
 ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options,
                                const cv::Mat& valid, std::unique_ptr<flow::FlowEstimator> flow,
-                               std::unique_ptr<flow::FlowEstimator> first_flow, mapping::OccupancyMap map)
+                               std::unique_ptr<flow::FlowEstimator> guide, mapping::OccupancyMap map)
     : camera_(camera),
       options_(options),
       valid_(valid.clone()),
       flow_(std::move(flow)),
-      first_flow_(std::move(first_flow)),
+      guide_(std::move(guide)),
       refiner_(options.refinement),
       depth_(options.depth),
       map_(std::move(map)) {
   if (!valid_.empty() && cv::countNonZero(valid_ == 0) == 0) valid_.release();
   flow_->set_mask(valid_);
-  first_flow_->set_mask(valid_);
+  guide_->set_mask(valid_);
 }
 
 std::string ObstacleMapper::reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const {
@@ -219,8 +222,13 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   const RelativeMotion prior =
       motion_between(older.given, newest.given, seconds_between(older.frame.time, newest.frame.time),
                      newest.frame.motion_covariance, options_.step, options_.order);
+  cv::Mat foretold;
+  {
+    const Stopwatch watch(update_, Stage::flow);
+    foretold = foretold_flow(prior);
+  }
   Pair pair = match(reference, newest_is_reference ? older.frame : newest.frame, prior,
-                    two ? *first_flow_ : *flow_, foretold_flow(prior));
+                    two ? *guide_ : *flow_, foretold);
   refine(pair, reference);
   place(newest, older);
 

@@ -35,8 +35,7 @@ enum class Order {
 };
 
 struct ObstacleMapperOptions {
-  std::string flow = "clg-fast";
-  std::string first_flow = "clg-fast-half";
+  std::string flow = "clg-fast-half";
   depth::Derotation derotation = depth::Derotation::image;
   Order order = Order::newest;
   int step = 1;
@@ -51,8 +50,6 @@ struct ObstacleMapperOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("flow", self.flow, "optical-flow method");
-    field("first_flow", self.first_flow,
-          "method for the first pair of two; its flow refines the motion and starts that of the second");
     field("derotate", self.derotation, "image | flow: where rotation is removed");
     field("order", self.order, "newest | first: the frame of a pair on whose pixels the depth lives");
     field("step", self.step, "pairs each frame with the step-th before it");
@@ -152,7 +149,7 @@ class ObstacleMapper {
     FlowField flow;
   };
   ObstacleMapper(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid,
-                 std::unique_ptr<flow::FlowEstimator> flow, std::unique_ptr<flow::FlowEstimator> first_flow,
+                 std::unique_ptr<flow::FlowEstimator> flow, std::unique_ptr<flow::FlowEstimator> guide,
                  mapping::OccupancyMap map);
   [[nodiscard]] std::string reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const;
   [[nodiscard]] bool two_baselines() const;
@@ -170,7 +167,8 @@ class ObstacleMapper {
   Camera camera_;
   ObstacleMapperOptions options_;
   cv::Mat valid_;
-  std::unique_ptr<flow::FlowEstimator> flow_, first_flow_;
+  std::unique_ptr<flow::FlowEstimator> flow_;   // of the last pair
+  std::unique_ptr<flow::FlowEstimator> guide_;  // of the first of two: refines the motion, starts the other
   depth::MotionRefiner refiner_;
   depth::DepthEstimator depth_;
   mapping::OccupancyMap map_;
