@@ -1,5 +1,6 @@
 #include "pade/depth/prediction.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -37,6 +38,7 @@ TEST(Prediction, OfTheExactFlowOfOnePairIsTheFlowOfTheOther) {
     const cv::Mat predicted = predict_flow(pair.exact.flow.vectors, kCamera, pair.motion, longer);
     ASSERT_TRUE(cv::checkRange(predicted));
     int compared = 0;
+    double worst = 0;
     for (int v = 0; v < kCamera.height; ++v) {
       for (int u = 0; u < kCamera.width; ++u) {
         const double z = pair.truth.at<float>(v, u);
@@ -46,11 +48,12 @@ TEST(Prediction, OfTheExactFlowOfOnePairIsTheFlowOfTheOther) {
         const cv::Vec2d truth = projected(kCamera, z, to, v, u);
         // The damping takes (e / |a|)^2 of the parallax, e = 5 px |t|.
         const double damped = std::pow(5 * from.norm() / reach, 2) * cv::norm(truth);
-        EXPECT_LT(cv::norm(cv::Vec2d(predicted.at<cv::Vec2f>(v, u)) - truth), 1e-3 + 1.3 * damped)
-            << v << ' ' << u;
+        const double error = cv::norm(cv::Vec2d(predicted.at<cv::Vec2f>(v, u)) - truth);
+        worst = std::max(worst, error - 1.3 * damped);
         compared += damped < 0.5 ? 1 : 0;
       }
     }
+    EXPECT_LT(worst, 1e-3) << from.transpose();
     EXPECT_GT(compared, 0.5 * kCamera.size().area());
   }
 }

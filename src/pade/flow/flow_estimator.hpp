@@ -32,7 +32,7 @@ enum class FlowConfidence {
 /// What a given initial flow is to the search.
 enum class InitialFlow {
   replaces,  ///< what coarser levels would find: they are left out
-  competes,  ///< pixel by pixel, with what coarser levels have found: what matches the images better is kept
+  competes,  ///< pixel by pixel, there and on finer levels, with what was found: what matches better is kept
 };
 
 /// Options of all our own methods.

@@ -23,6 +23,9 @@ constexpr double kSigmaWindow = 2.5;
 constexpr int kSigmaRadius = 5;
 constexpr float kGreyNoise = 1.0F;
 
+// Pixels by which two flows may differ and still be refined to the same one.
+constexpr float kAlike = 0.5F;
+
 /// Sum of absolute differences of 5 x 5 pixels about (x, y) and their matches; infinity where the match of
 /// the centre leaves the image.
 float mismatch(const PlaneView& first, const PlaneView& second, int x, int y, float u, float v) {
@@ -125,7 +128,7 @@ void PyramidFlow::coarse_to_fine(int from, int to, const cv::Mat& initial) {
   coarsest_ = given && !competes ? taken_up : count_ - 1;
   for (int level = coarsest_; level >= finest_level(); --level) {
     start(level, given && !competes ? initial : cv::Mat());
-    if (competes && level == taken_up) take_up(initial, level, from, to);
+    if (competes && level <= taken_up) take_up(initial, level, from, to);
     refine(level, from, to, flow_);
   }
   if (finest_level() > 0) start(0, initial);
@@ -208,7 +211,8 @@ void PyramidFlow::start(int level, const cv::Mat& initial) {
   std::swap(flow_, spare_);
 }
 
-// Each pixel keeps what matches its surroundings better: the flow it has, or the given one.
+// Each pixel keeps what matches its surroundings better: the flow it has, or the given one. Where they hardly
+// differ there is nothing to decide. On every level again, for what is too thin for the coarser ones.
 void PyramidFlow::take_up(const cv::Mat& initial, int level, int from, int to) {
   load_flow(initial, level, spare_);
   const PlaneView& first = image(from, level);
@@ -219,6 +223,7 @@ void PyramidFlow::take_up(const cv::Mat& initial, int level, int from, int to) {
     for (int x = 0; x < first.width; ++x) {
       const float given_u = spare_.u.row(y)[x];
       const float given_v = spare_.v.row(y)[x];
+      if (std::abs(given_u - u[x]) <= kAlike && std::abs(given_v - v[x]) <= kAlike) continue;
       if (mismatch(first, second, x, y, given_u, given_v) >= mismatch(first, second, x, y, u[x], v[x]))
         continue;
       u[x] = given_u;
