@@ -151,7 +151,8 @@ TEST(Navigator, FindsItsYawInFlightWithinTenSeconds) {
     const auto figures = run_protocol(log, options(), p);
     EXPECT_LT(figures.aligned.seconds(), 10) << "seed " << seed;
     EXPECT_GT(figures.aligned.seconds(), 0) << "seed " << seed;
-    EXPECT_LT(std::abs(figures.yaw_error_aligned), 10 * kDegree) << "seed " << seed;
+    EXPECT_LT(std::abs(figures.yaw_error_aligned), 0.25)
+        << "two of the sigmas that it begins with, seed " << seed;
   }
 }
 
@@ -306,7 +307,7 @@ TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
   const auto answer = [&](double heading_sigma) {
     Navigator navigator(NavigatorOptions{});
     ReplayOptions replay_options;
-    for (double t = 2; t < 8; t += 1) replay_options.headings.push_back({at(t), 0, heading_sigma});
+    for (const double t : {2.0, 3.0}) replay_options.headings.push_back({at(t), 0, heading_sigma});
     RelativePose result;
     replay(log, navigator, replay_options, [&](Time now) {
       if (now == at(7)) result = navigator.relative_pose(at(6.9), at(7), Pose{});
@@ -314,7 +315,7 @@ TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
     EXPECT_EQ(result.answer, Answer::valid);
     return result;
   };
-  const RelativePose doubtful = answer(0.45);
+  const RelativePose doubtful = answer(0.25);
   const RelativePose known = answer(0.03);
   EXPECT_TRUE(doubtful.scale_valid);
   EXPECT_FALSE(doubtful.direction_valid);
