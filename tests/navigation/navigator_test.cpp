@@ -304,10 +304,11 @@ TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
     log.gnss.fixes.push_back(epoch.fix);
     log.gnss.velocities.push_back(epoch.velocity);
   }
-  const auto answer = [&](double heading_sigma) {
+  const auto answer = [&](double heading_sigma, double last_heading) {
     Navigator navigator(NavigatorOptions{});
     ReplayOptions replay_options;
-    for (const double t : {2.0, 3.0}) replay_options.headings.push_back({at(t), 0, heading_sigma});
+    for (double t = 2; t <= last_heading; t += 1)
+      replay_options.headings.push_back({at(t), 0, heading_sigma});
     RelativePose result;
     replay(log, navigator, replay_options, [&](Time now) {
       if (now == at(7)) result = navigator.relative_pose(at(6.9), at(7), Pose{});
@@ -315,8 +316,8 @@ TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
     EXPECT_EQ(result.answer, Answer::valid);
     return result;
   };
-  const RelativePose doubtful = answer(0.25);
-  const RelativePose known = answer(0.03);
+  const RelativePose doubtful = answer(0.25, 3);
+  const RelativePose known = answer(0.03, 7);
   EXPECT_TRUE(doubtful.scale_valid);
   EXPECT_FALSE(doubtful.direction_valid);
   EXPECT_EQ(doubtful.status, NavigationStatus::levelled);
