@@ -316,7 +316,7 @@ TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
     EXPECT_EQ(result.answer, Answer::valid);
     return result;
   };
-  const RelativePose doubtful = answer(0.25, 3);
+  const RelativePose doubtful = answer(0.2, 3);
   const RelativePose known = answer(0.03, 7);
   EXPECT_TRUE(doubtful.scale_valid);
   EXPECT_FALSE(doubtful.direction_valid);
@@ -361,32 +361,6 @@ TEST(Navigator, LearnsTheGyroscopeBiasFromACompassWithIronWithinSeconds) {
   }
   EXPECT_GT(nees, 1.5);
   EXPECT_LT(nees, 5);
-}
-
-TEST(Navigator, PublishesADoubtfulYawWithTheDoubtOfTheWholeBank) {
-  // Without compass or heading: the bank of hypotheses becomes one filter that knows how far they part.
-  double nees = 0;
-  constexpr int kSeeds = 12;
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const Flight path{.rest = 0, .speed = 1.5};
-    const auto log = record(path, 20, ImuModel::industrial(), single_point(), 40 + seed);
-    Navigator navigator(options());
-    AbsolutePose first;
-    Time time;
-    replay(log, navigator, ReplayOptions{}, [&](Time now) {
-      if (first.answer == Answer::valid) return;
-      first = navigator.absolute_pose(now);
-      time = now;
-    });
-    ASSERT_EQ(first.answer, Answer::valid) << "seed " << seed;
-    const auto truth = path.at(time.seconds());
-    const Quaterniond difference = first.T_world_body.rotation * truth.R_world_body.conjugate();
-    const Eigen::RowVector3d up = first.T_world_body.matrix3().row(2);
-    const double variance = (up * first.covariance.topLeftCorner<3, 3>() * up.transpose()).value();
-    EXPECT_LT(std::sqrt(variance), 0.35);
-    nees += std::pow(rotation_log(difference).z(), 2) / variance / kSeeds;
-  }
-  EXPECT_LT(nees, 2.5);
 }
 
 }  // namespace
