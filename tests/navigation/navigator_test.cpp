@@ -151,7 +151,8 @@ TEST(Navigator, FindsItsYawInFlightWithinTenSeconds) {
     const auto figures = run_protocol(log, options(), p);
     EXPECT_LT(figures.aligned.seconds(), 10) << "seed " << seed;
     EXPECT_GT(figures.aligned.seconds(), 0) << "seed " << seed;
-    EXPECT_LT(std::abs(figures.yaw_error_aligned), 10 * kDegree) << "seed " << seed;
+    EXPECT_LT(std::abs(figures.yaw_error_aligned), 0.25)
+        << "two of the sigmas that it begins with, seed " << seed;
   }
 }
 
@@ -303,10 +304,11 @@ TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
     log.gnss.fixes.push_back(epoch.fix);
     log.gnss.velocities.push_back(epoch.velocity);
   }
-  const auto answer = [&](double heading_sigma) {
+  const auto answer = [&](double heading_sigma, double last_heading) {
     Navigator navigator(NavigatorOptions{});
     ReplayOptions replay_options;
-    for (double t = 2; t < 8; t += 1) replay_options.headings.push_back({at(t), 0, heading_sigma});
+    for (double t = 2; t <= last_heading; t += 1)
+      replay_options.headings.push_back({at(t), 0, heading_sigma});
     RelativePose result;
     replay(log, navigator, replay_options, [&](Time now) {
       if (now == at(7)) result = navigator.relative_pose(at(6.9), at(7), Pose{});
@@ -314,8 +316,8 @@ TEST(Navigator, TellsADoubtfulDirectionFromADoubtfulLength) {
     EXPECT_EQ(result.answer, Answer::valid);
     return result;
   };
-  const RelativePose doubtful = answer(0.45);
-  const RelativePose known = answer(0.03);
+  const RelativePose doubtful = answer(0.2, 3);
+  const RelativePose known = answer(0.03, 7);
   EXPECT_TRUE(doubtful.scale_valid);
   EXPECT_FALSE(doubtful.direction_valid);
   EXPECT_EQ(doubtful.status, NavigationStatus::levelled);
@@ -359,32 +361,6 @@ TEST(Navigator, LearnsTheGyroscopeBiasFromACompassWithIronWithinSeconds) {
   }
   EXPECT_GT(nees, 1.5);
   EXPECT_LT(nees, 5);
-}
-
-TEST(Navigator, PublishesADoubtfulYawWithTheDoubtOfTheWholeBank) {
-  // Without compass or heading: the bank of hypotheses becomes one filter that knows how far they part.
-  double nees = 0;
-  constexpr int kSeeds = 12;
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const Flight path{.rest = 0, .speed = 1.5};
-    const auto log = record(path, 20, ImuModel::industrial(), single_point(), 40 + seed);
-    Navigator navigator(options());
-    AbsolutePose first;
-    Time time;
-    replay(log, navigator, ReplayOptions{}, [&](Time now) {
-      if (first.answer == Answer::valid) return;
-      first = navigator.absolute_pose(now);
-      time = now;
-    });
-    ASSERT_EQ(first.answer, Answer::valid) << "seed " << seed;
-    const auto truth = path.at(time.seconds());
-    const Quaterniond difference = first.T_world_body.rotation * truth.R_world_body.conjugate();
-    const Eigen::RowVector3d up = first.T_world_body.matrix3().row(2);
-    const double variance = (up * first.covariance.topLeftCorner<3, 3>() * up.transpose()).value();
-    EXPECT_LT(std::sqrt(variance), 0.35);
-    nees += std::pow(rotation_log(difference).z(), 2) / variance / kSeeds;
-  }
-  EXPECT_LT(nees, 2.5);
 }
 
 }  // namespace

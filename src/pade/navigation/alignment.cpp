@@ -62,15 +62,6 @@ BaseMatrix prior(const FilterOptions& options, const Quaterniond& R, double tilt
   return P;
 }
 
-/// The error that takes one state to another.
-BaseVector difference(const NavigationState& from, const NavigationState& to) {
-  BaseVector error;
-  error << (from.X.inverse() * to.X).log(), to.gyroscope_bias - from.gyroscope_bias,
-      to.accelerometer_bias - from.accelerometer_bias, to.position_bias - from.position_bias,
-      to.height_bias - from.height_bias, to.iron - from.iron;
-  return error;
-}
-
 Time earlier(Time time, double seconds) {
   return Time{time.nanoseconds - Time::from_seconds(seconds).nanoseconds};
 }
@@ -269,34 +260,13 @@ AlignmentPhase Alignment::weigh() {
       hypothesis.alive = false;
       continue;
     }
-    hypothesis.weight = std::exp(-behind);
+    const double weight = std::exp(-behind);
     const Yaw yaw = yaw_of(hypothesis.filter);
     const double difference = std::remainder(yaw.angle - centre, 2 * std::numbers::pi);
-    total += hypothesis.weight;
-    spread += hypothesis.weight * (difference * difference + yaw.sigma * yaw.sigma);
+    total += weight;
+    spread += weight * (difference * difference + yaw.sigma * yaw.sigma);
   }
-  if (std::sqrt(spread / total) > options_.yaw_known) return AlignmentPhase::levelled;
-  merge();
-  return AlignmentPhase::aligned;
-}
-
-void Alignment::merge() {
-  // The first two moments of the bank, about the best: what the hypotheses disagree in is doubt that remains.
-  FilterSnapshot merged = bank_[best_].filter.snapshot();
-  double total = 0;
-  BaseVector mean = BaseVector::Zero();
-  BaseMatrix second = BaseMatrix::Zero();
-  for (Hypothesis& hypothesis : bank_) {
-    if (!hypothesis.alive) continue;
-    const BaseVector error = difference(merged.state, hypothesis.filter.state());
-    total += hypothesis.weight;
-    mean += hypothesis.weight * error;
-    second += hypothesis.weight * (hypothesis.filter.covariance() + error * error.transpose());
-  }
-  mean /= total;
-  merged.state.retract(mean);
-  merged.P = second / total - mean * mean.transpose();
-  bank_[best_].filter.restore(merged);
+  return std::sqrt(spread / total) < options_.yaw_known ? AlignmentPhase::aligned : AlignmentPhase::levelled;
 }
 
 }  // namespace pade::navigation

@@ -18,7 +18,7 @@ struct AlignmentOptions {
   double motion_window = 1.0;           ///< baseline of the first GNSS velocities of a start in motion, s
   double heading_sigma_magnetic = 0.3;  ///< of a start at a magnetometer's yaw, which updates narrow, rad
   int hypotheses = 12;                  ///< yaws of the bank
-  double yaw_known = 0.2;               ///< spread of the bank's yaw at which it becomes one filter, rad
+  double yaw_known = 0.15;              ///< spread of the bank's yaw at which the best filter is taken, rad
   double lag = 0.4;                     ///< the bank waits this long for late data, s
 
   template <class Self, class Visitor>
@@ -32,7 +32,7 @@ struct AlignmentOptions {
           "baseline of the first GNSS velocities of a start in motion, s");
     field("heading_sigma_magnetic", self.heading_sigma_magnetic, "of a magnetometer's first yaw, rad");
     field("hypotheses", self.hypotheses, "yaws of the bank");
-    field("yaw_known", self.yaw_known, "spread of the bank's yaw at which it becomes one filter, rad");
+    field("yaw_known", self.yaw_known, "spread of the bank's yaw at which the best filter is taken, rad");
     field("lag", self.lag, "the start waits this long for late data, s");
   }
 };
@@ -76,7 +76,6 @@ class Alignment {
   struct Hypothesis {
     Filter filter;
     bool alive = false;
-    double weight = 0;  ///< probability relative to the best
   };
 
   bool start_from_rest(Timeline& timeline, Time now);
@@ -84,7 +83,6 @@ class Alignment {
   bool start_in_motion(Timeline& timeline, Time now);
   void begin_at_first_fix(const Timeline& timeline, Time until);
   AlignmentPhase weigh();
-  void merge();
 
   AlignmentOptions options_;
   std::vector<Hypothesis> bank_;
