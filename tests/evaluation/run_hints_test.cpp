@@ -94,7 +94,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"PosesTooUncertainAndNotRefined",
                          [](io::RunInfo& run) {
                            empty(run);
-                           run.options = R"({"mapper":{"refine_motion":"off"}})";
+                           run.options = R"({"mapper":{"refinement":{"on":false}}})";
                            run.map->depths_uncertain = run.map->depths - run.map->depths_beyond;
                            run.motion.rotation_sigma = 0.25;
                          },
