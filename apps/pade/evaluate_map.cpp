@@ -263,12 +263,12 @@ Result<MapAccuracy> accuracy_of(const std::string& folder, const KnownWorld& wor
   accuracy.voxel = run->options.mapper.map.voxel;
   accuracy.range = run->options.mapper.map.range;
   if (arguments.align) accuracy.alignment = alignment_of(run->frames);
-  if (Status status = measure_maps(*run, world, arguments, accuracy); !status) return status.error();
   if (!arguments.reference.empty()) {
     auto reference = reference_of(*run, arguments.reference);
     if (!reference) return reference.error();
     accuracy.reference = std::move(reference).value();
   }
+  if (Status status = measure_maps(*run, world, arguments, accuracy); !status) return status.error();
   if (arguments.replay) {
     auto replayed = replay(*run, world);
     if (!replayed) return replayed.error();

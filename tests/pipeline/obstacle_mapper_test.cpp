@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -336,6 +338,23 @@ TEST(ObstacleMapper, RefusesWhatMakesNoSenseByName) {
   options = {};
   options.depth.range = -1;
   EXPECT_THAT(refusal(options), HasSubstr("range"));
+  const double nan = std::nan("");
+  for (const auto& [name, spoil] :
+       std::vector<std::pair<std::string, std::function<void(ObstacleMapperOptions&)>>>{
+           {"longest_step", [](auto& o) { o.longest_step = -2; }},
+           {"prior_level", [](auto& o) { o.prior_level = -7; }},
+           {"largest_parallax", [&](auto& o) { o.largest_parallax = nan; }},
+           {"refinement.pixels", [](auto& o) { o.refinement.pixels = -5; }},
+           {"edges.radius", [](auto& o) { o.edges.radius = 1000000; }},
+           {"edges.nearness", [&](auto& o) { o.edges.nearness = nan; }},
+           {"edges.hole", [](auto& o) { o.edges.hole = -1; }},
+           {"bound_sigmas", [&](auto& o) { o.depth.bound_sigmas = nan; }},
+           {"flow_sigma_scale", [](auto& o) { o.depth.flow_sigma_scale = -1; }},
+           {"flow_relative_sigma", [](auto& o) { o.depth.flow_relative_sigma = -1; }}}) {
+    options = {};
+    spoil(options);
+    EXPECT_THAT(refusal(options), HasSubstr(name));
+  }
   options = {};
   options.map.voxel = 0;
   EXPECT_THAT(refusal(options), HasSubstr("voxel"));

@@ -1,5 +1,6 @@
 #include "pade/pipeline/obstacle_mapper.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -40,6 +41,34 @@ std::string size_text(const cv::Mat& image) {
   return std::to_string(image.cols) + " x " + std::to_string(image.rows);
 }
 
+/// The numbers of two baselines, refinement, bounds and edges; the message names the first that makes no
+/// sense.
+Status check_chain(const ObstacleMapperOptions& o, int largest_window) {
+  struct Range {
+    const char* option;
+    double value, from, to;
+  };
+  constexpr double kMost = 1e6;
+  const Range ranges[] = {
+      {"longest_step", static_cast<double>(o.longest_step), 1, 1000},
+      {"prior_level", static_cast<double>(o.prior_level), -1, 16},
+      {"largest_parallax", o.largest_parallax, 0, kMost},
+      {"refinement.pixels", static_cast<double>(o.refinement.pixels), 1, kMost},
+      {"edges.radius", static_cast<double>(o.edges.radius), 0, std::min(0.5 * largest_window, 64.0)},
+      {"edges.nearness", o.edges.nearness, 0, 1},
+      {"edges.hole", o.edges.hole, 0, kMost},
+      {"depth.bound_sigmas", o.depth.bound_sigmas, 0, kMost},
+      {"depth.flow_sigma_scale", o.depth.flow_sigma_scale, 0, kMost},
+      {"depth.flow_relative_sigma", o.depth.flow_relative_sigma, 0, kMost},
+  };
+  for (const Range& range : ranges) {
+    if (range.value >= range.from && range.value <= range.to) continue;  // false for NaN
+    return Error{std::string("option ") + range.option + " is " + std::to_string(range.value) +
+                 ", expected " + std::to_string(range.from) + " to " + std::to_string(range.to)};
+  }
+  return {};
+}
+
 Status check(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid) {
   if (camera.width < 16 || camera.height < 16 || !(camera.fx > 0) || !(camera.fy > 0) ||
       !camera.is_pinhole()) {
@@ -63,7 +92,7 @@ Status check(const Camera& camera, const ObstacleMapperOptions& options, const c
     return Error{"option range is " + std::to_string(options.depth.range) +
                  ", expected a positive number of metres"};
   }
-  return {};
+  return check_chain(options, largest);
 }
 
 /// The motion that the poses as given tell, with its covariance. Over several frames the error is that of a
