@@ -56,7 +56,6 @@ Status check_chain(const ObstacleMapperOptions& o, int largest_window) {
       {"refinement.pixels", static_cast<double>(o.refinement.pixels), 1, kMost},
       {"edges.radius", static_cast<double>(o.edges.radius), 0, std::min(0.5 * largest_window, 64.0)},
       {"edges.nearness", o.edges.nearness, 0, 1},
-      {"edges.hole", o.edges.hole, 0, kMost},
       {"depth.bound_sigmas", o.depth.bound_sigmas, 0, kMost},
       {"depth.flow_sigma_scale", o.depth.flow_sigma_scale, 0, kMost},
       {"depth.flow_relative_sigma", o.depth.flow_relative_sigma, 0, kMost},
@@ -285,7 +284,6 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   if (options_.depth.gates == depth::Gates::on) {
     const Stopwatch watch(update_, Stage::depth);
     depth::guard_edges(update_.depth, options_.edges);
-    depth::close_epipole(update_.depth, camera_, pair.motion, options_.edges.hole);
   }
   update_.depth.time = reference.time;
   update_.reference = reference;
