@@ -14,17 +14,17 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 
-#include "pade/evaluation/map_accuracy_tables.hpp"
-#include "pade/evaluation/map_ceiling.hpp"
+#include "pade/evaluation/map/map_ceiling.hpp"
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/map_files.hpp"
+#include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
-#include "pade/io/run_reader.hpp"
-#include "pade/io/trajectory.hpp"
+#include "pade/io/run/run_reader.hpp"
+#include "pade/io/sequence/trajectory.hpp"
 #include "pade/pipeline/map_replay.hpp"
-#include "pade/simulation/sdf_reader.hpp"
-#include "pade/simulation/truth.hpp"
-#include "pade/simulation/world_solids.hpp"
+#include "pade/report/map_accuracy_tables.hpp"
+#include "pade/simulation/render/truth.hpp"
+#include "pade/simulation/sdf/sdf_reader.hpp"
+#include "pade/simulation/world/world_solids.hpp"
 
 #include "progress.hpp"
 

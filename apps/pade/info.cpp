@@ -13,14 +13,14 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pade/evaluation/accuracy_tables.hpp"
-#include "pade/evaluation/run_evaluation.hpp"
-#include "pade/evaluation/scene_hardness.hpp"
-#include "pade/evaluation/sequence_check.hpp"
+#include "pade/checks/scene_hardness.hpp"
+#include "pade/checks/sequence_check.hpp"
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/map_files.hpp"
-#include "pade/io/run_reader.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/formats/map_files.hpp"
+#include "pade/io/run/run_reader.hpp"
+#include "pade/io/sequence/sequence.hpp"
+#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/run_evaluation.hpp"
 
 #include "commands.hpp"
 

@@ -7,13 +7,13 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "pade/evaluation/accuracy_tables.hpp"
-#include "pade/evaluation/run_hints.hpp"
+#include "pade/checks/run_hints.hpp"
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
 #include "pade/pipeline/map_sequence.hpp"
+#include "pade/report/accuracy_tables.hpp"
 
 #include "commands.hpp"
 #include "enum_option.hpp"

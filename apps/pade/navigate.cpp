@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/navigation_log.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/text.hpp"
 #include "pade/pipeline/navigation_report.hpp"
 #include "pade/pipeline/navigation_run.hpp"

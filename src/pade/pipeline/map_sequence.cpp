@@ -9,15 +9,15 @@
 #include <utility>
 #include <vector>
 
+#include "pade/checks/run_hints.hpp"
 #include "pade/core/version.hpp"
-#include "pade/evaluation/accuracy_tables.hpp"
-#include "pade/evaluation/report.hpp"
-#include "pade/evaluation/run_hints.hpp"
-#include "pade/io/cloud_files.hpp"
-#include "pade/io/map_files.hpp"
+#include "pade/io/formats/cloud_files.hpp"
+#include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/pipeline/navigation_run.hpp"
 #include "pade/pipeline/run_tally.hpp"
+#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/report.hpp"
 
 namespace pade {
 namespace {

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "pade/core/navigation_log.hpp"
 #include "pade/core/result.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
 #include "pade/evaluation/navigation_score.hpp"
-#include "pade/io/navigation_log.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
+#include "pade/io/sequence/sequence.hpp"
 #include "pade/navigation/navigator.hpp"
 
 namespace pade {
