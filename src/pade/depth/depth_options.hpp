@@ -54,7 +54,7 @@ struct DepthOptions {
   double residual_angle = 0.25;
   double texture_gate = 3;
   double texture_correlation = 0.5;
-  double bound_sigmas = 3.6;
+  double bound_sigmas = 3.8;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -91,7 +91,7 @@ struct DepthOptions {
 /// What the chain uses: sigma as calibrated on the half-size flow of CLG (docs/method.md, "Variance").
 inline DepthOptions chain_options() {
   DepthOptions options;
-  options.flow_sigma_scale = 1.6;
+  options.flow_sigma_scale = 0.7;
   options.flow_relative_sigma = 0.005;
   return options;
 }

@@ -263,6 +263,7 @@ void confidence_twin(Twins& twins, simd::InstructionSet set, Images& m) {
   input.taps = m.k.data();
   input.radius = kRadius;
   input.noise = 1;
+  input.scale = 2;
   input.effective_size = 9;
   int wrong_matches = 0;
   int right_matches = 0;
@@ -296,7 +297,7 @@ void confidence_twin(Twins& twins, simd::InstructionSet set, Images& m) {
               return rx * rx + ry * ry;
             },
             x, y);
-        const double limit = 0.15 + 2 / (1 + std::hypot(at(input.u, x, y), at(input.v, x, y)));
+        const double limit = 0.1 + 0.5 / (1 + input.scale * std::hypot(at(input.u, x, y), at(input.v, x, y)));
         const bool wrong = left - 2 > limit * (2 * (xx + yy) + 2);
         ++(wrong ? wrong_matches : right_matches);
         if (wrong) return std::numeric_limits<double>::infinity();

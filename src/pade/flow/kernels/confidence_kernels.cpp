@@ -18,8 +18,8 @@ namespace {
 // Share of the gradients that the warp must not leave standing: kWrong for a long way, kSlack more for none.
 // A wrong match is a likely one only where the search went far; and over a short way near gradients that the
 // sampling does not hold (foliage against the sky) leave more than that behind.
-constexpr float kWrong = 0.15F;
-constexpr float kSlack = 2.0F;
+constexpr float kWrong = 0.1F;
+constexpr float kSlack = 0.5F;
 constexpr float kNoiseGradients =
     2.0F;  // |grad r|^2 of central differences, per grey^2 of noise in each image
 constexpr int kChannels = 6;
@@ -111,7 +111,7 @@ void flow_sigma(const ConfidenceInput& input, int first, int last, float* scratc
             const V u = load(input.u.row(y) + x);
             const V v = load(input.v.row(y) + x);
             const V noise2 = set(kNoiseGradients * input.noise * input.noise);
-            const V limit = set(kWrong) + set(kSlack) / (1.0F + sqrt(u * u + v * v));
+            const V limit = set(kWrong) + set(kSlack) / (1.0F + input.scale * sqrt(u * u + v * v));
             const I wrong = I(sum[5] - noise2 > limit * (2.0F * (sum[0] + sum[2]) + noise2));
             const V to_x = u + (ramp() + static_cast<float>(x));
             const V to_y = v + static_cast<float>(y);

@@ -13,6 +13,7 @@ struct ConfidenceInput {
   PlaneView sigma;                   ///< result, pixels
   const float* taps = nullptr;       ///< window, normalised to sum 1
   int radius = 0;
+  float scale = 1;           ///< pixels of the image per pixel here
   float noise = 0;           ///< standard deviation of grey values, at least
   float effective_size = 0;  ///< 1 / sum of squared window weights, pixels
 };

@@ -18,10 +18,12 @@ bool usable(const cv::Mat& image) {
 // Pixels below which a strip is not worth a thread.
 constexpr long kSmallestArea = 4096;
 
-// Window over which the confidence is judged, and the least noise of grey values that is assumed there.
+// Window over which the confidence is judged, and the least noise of grey values that is assumed there. At
+// half size the same window has a quarter of the pixels, each the mean of four.
 constexpr double kSigmaWindow = 2.5;
 constexpr int kSigmaRadius = 5;
 constexpr float kGreyNoise = 1.0F;
+constexpr int kHalfSigmaRadius = 3;
 
 // Pixels by which two flows may differ and still be refined to the same one.
 constexpr float kAlike = 0.5F;
@@ -64,7 +66,8 @@ PyramidFlow::PyramidFlow(const FlowOptions& options)
     : options_(options),
       workers_(std::max(1, options.threads)),
       scratch_(static_cast<std::size_t>(workers_.size())),
-      sigma_taps_(gaussian_taps(kSigmaWindow, kSigmaRadius)) {}
+      sigma_taps_(options.half_resolution ? gaussian_taps(0.5 * kSigmaWindow, kHalfSigmaRadius)
+                                          : gaussian_taps(kSigmaWindow, kSigmaRadius)) {}
 
 FlowField PyramidFlow::estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) {
   restart();
@@ -114,8 +117,9 @@ FlowField PyramidFlow::run(int from, int to, const cv::Mat& initial) {
   }
   build_mask();
   coarse_to_fine(from, to, initial);
-  field.vectors = to_vectors(flow_);
   if (options_.confidence != FlowConfidence::none) field.sigma = sigma(from, to);
+  if (finest_level() > 0) start(0, initial);
+  field.vectors = to_vectors(flow_);
   if (masked_) field.vectors.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), mask_ == 0);
   return field;
 }
@@ -126,18 +130,27 @@ void PyramidFlow::coarse_to_fine(int from, int to, const cv::Mat& initial) {
   const int taken_up = std::clamp(options_.initial_level, finest_level(), count_ - 1);
   const bool competes = given && options_.initial == InitialFlow::competes && taken_up < count_ - 1;
   coarsest_ = given && !competes ? taken_up : count_ - 1;
+  if (competes) {
+    given_.resize(static_cast<std::size_t>(taken_up) + 1);
+    load_flow(initial, finest_level(), given_[static_cast<std::size_t>(finest_level())]);
+    for (auto level = static_cast<std::size_t>(finest_level()); level < static_cast<std::size_t>(taken_up);
+         ++level)
+      halve_flow(given_[level], given_[level + 1]);
+  }
   for (int level = coarsest_; level >= finest_level(); --level) {
     start(level, given && !competes ? initial : cv::Mat());
-    if (competes && level <= taken_up) take_up(initial, level, from, to);
+    if (competes && level <= taken_up) take_up(given_[static_cast<std::size_t>(level)], level, from, to);
     refine(level, from, to, flow_);
   }
-  if (finest_level() > 0) start(0, initial);
 }
 
+/// On the finest level that was searched, in pixels of the image.
 cv::Mat PyramidFlow::sigma(int from, int to) {
+  const int level = finest_level();
+  const int scale = 1 << level;
   ConfidenceInput input;
-  input.first = image(from, 0);
-  input.second = image(to, 0);
+  input.first = image(from, level);
+  input.second = image(to, level);
   sigma_.resize(input.first.width, input.first.height);
   input.u = flow_.u.view();
   input.v = flow_.v.view();
@@ -147,14 +160,24 @@ cv::Mat PyramidFlow::sigma(int from, int to) {
   }
   input.sigma = sigma_.view();
   input.taps = sigma_taps_.data();
-  input.radius = kSigmaRadius;
-  input.noise = kGreyNoise;
+  input.radius = static_cast<int>(sigma_taps_.size()) - 1;
+  input.scale = static_cast<float>(scale);
+  input.noise = kGreyNoise / static_cast<float>(scale);
   input.effective_size = static_cast<float>(effective_window(sigma_taps_));
   over_rows(input.first, [&](int first, int last, float* scratch) {
     PADE_DISPATCH(flow_sigma, isa_)(input, first, last, scratch);
   });
-  cv::Mat result(input.first.height, input.first.width, CV_32FC1);
-  for (int y = 0; y < result.rows; ++y) std::copy_n(sigma_.row(y), result.cols, result.ptr<float>(y));
+  cv::Mat result(image(from, 0).height, image(from, 0).width, CV_32FC1);
+  for (int y = 0; y < result.rows; ++y) {
+    const float* const row = sigma_.row(std::min(y / scale, input.first.height - 1));
+    auto* const out = result.ptr<float>(y);
+    if (scale == 1) {
+      std::copy_n(row, result.cols, out);
+      continue;
+    }
+    for (int x = 0; x < result.cols; ++x)
+      out[x] = static_cast<float>(scale) * row[std::min(x / scale, input.first.width - 1)];
+  }
   return result;
 }
 
@@ -213,16 +236,15 @@ void PyramidFlow::start(int level, const cv::Mat& initial) {
 
 // Each pixel keeps what matches its surroundings better: the flow it has, or the given one. Where they hardly
 // differ there is nothing to decide. On every level again, for what is too thin for the coarser ones.
-void PyramidFlow::take_up(const cv::Mat& initial, int level, int from, int to) {
-  load_flow(initial, level, spare_);
+void PyramidFlow::take_up(const FlowPlanes& given, int level, int from, int to) {
   const PlaneView& first = image(from, level);
   const PlaneView& second = image(to, level);
   for (int y = 0; y < first.height; ++y) {
     float* const u = flow_.u.row(y);
     float* const v = flow_.v.row(y);
     for (int x = 0; x < first.width; ++x) {
-      const float given_u = spare_.u.row(y)[x];
-      const float given_v = spare_.v.row(y)[x];
+      const float given_u = given.u.row(y)[x];
+      const float given_v = given.v.row(y)[x];
       if (std::abs(given_u - u[x]) <= kAlike && std::abs(given_v - v[x]) <= kAlike) continue;
       if (mismatch(first, second, x, y, given_u, given_v) >= mismatch(first, second, x, y, u[x], v[x]))
         continue;

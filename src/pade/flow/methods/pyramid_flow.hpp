@@ -57,7 +57,7 @@ class PyramidFlow : public FlowEstimator {
   FlowField run(int from, int to, const cv::Mat& initial);
   void coarse_to_fine(int from, int to, const cv::Mat& initial);
   void start(int level, const cv::Mat& initial);
-  void take_up(const cv::Mat& initial, int level, int from, int to);
+  void take_up(const FlowPlanes& given, int level, int from, int to);
   cv::Mat sigma(int from, int to);
   void build_mask();
 
@@ -74,6 +74,7 @@ class PyramidFlow : public FlowEstimator {
   FlowPlanes flow_;
   FlowPlanes spare_;
   FlowPlanes backward_;
+  std::vector<FlowPlanes> given_;  // that competes, per level
   cv::Mat mask_;
   std::vector<Plane> mask_levels_;
   bool masked_ = false;  // the mask fits the present images and direction

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <opencv2/imgproc.hpp>
 
@@ -69,28 +70,46 @@ void FlowPlanes::resize(int width, int height) {
 }
 
 void load_flow(const cv::Mat& vectors, int level, FlowPlanes& flow) {
-  cv::Mat known = vectors.clone();
-  for (int y = 0; y < known.rows; ++y) {
-    auto* row = known.ptr<cv::Vec2f>(y);
-    for (int x = 0; x < known.cols; ++x) {
-      const bool usable = std::abs(row[x][0]) <= static_cast<float>(known.cols) &&
-                          std::abs(row[x][1]) <= static_cast<float>(known.rows);
-      if (!usable) row[x] = {0, 0};
+  const int side = 1 << level;
+  const auto largest_u = static_cast<float>(vectors.cols);
+  const auto largest_v = static_cast<float>(vectors.rows);
+  flow.resize((vectors.cols + side - 1) >> level, (vectors.rows + side - 1) >> level);
+  for (int y = 0; y < flow.u.height(); ++y) {
+    float* const u = flow.u.row(y);
+    float* const v = flow.v.row(y);
+    std::fill_n(u, flow.u.width(), 0.0F);
+    std::fill_n(v, flow.u.width(), 0.0F);
+    const int bottom = std::min(vectors.rows, (y + 1) * side);
+    for (int row = y * side; row < bottom; ++row) {
+      const auto* from = vectors.ptr<cv::Vec2f>(row);
+      for (int x = 0; x < vectors.cols; ++x) {
+        const bool usable = std::abs(from[x][0]) <= largest_u && std::abs(from[x][1]) <= largest_v;
+        u[x >> level] += usable ? from[x][0] : 0.0F;
+        v[x >> level] += usable ? from[x][1] : 0.0F;
+      }
+    }
+    for (int x = 0; x < flow.u.width(); ++x) {
+      const int pixels = (bottom - y * side) * (std::min(vectors.cols, (x + 1) * side) - x * side);
+      const float share = 1.0F / static_cast<float>(pixels * side);
+      u[x] *= share;
+      v[x] *= share;
     }
   }
-  cv::Mat scaled = known;
-  if (level > 0) {
-    cv::Size size = vectors.size();
-    for (int i = 0; i < level; ++i) size = {(size.width + 1) / 2, (size.height + 1) / 2};
-    cv::resize(known, scaled, size, 0, 0, cv::INTER_AREA);
-  }
-  const float factor = 1.0F / static_cast<float>(1 << level);
-  flow.resize(scaled.cols, scaled.rows);
-  for (int y = 0; y < scaled.rows; ++y) {
-    const auto* from = scaled.ptr<cv::Vec2f>(y);
-    for (int x = 0; x < scaled.cols; ++x) {
-      flow.u.row(y)[x] = from[x][0] * factor;
-      flow.v.row(y)[x] = from[x][1] * factor;
+}
+
+void halve_flow(const FlowPlanes& fine, FlowPlanes& coarse) {
+  const int width = fine.u.width();
+  const int height = fine.u.height();
+  coarse.resize((width + 1) / 2, (height + 1) / 2);
+  for (int y = 0; y < coarse.u.height(); ++y) {
+    const int below = std::min(2 * y + 1, height - 1);
+    for (const auto& [from, to] : {std::pair{&fine.u, &coarse.u}, std::pair{&fine.v, &coarse.v}}) {
+      const float* const top = from->row(2 * y);
+      const float* const bottom = from->row(below);
+      for (int x = 0; x < to->width(); ++x) {
+        const int right = std::min(2 * x + 1, width - 1);
+        to->row(y)[x] = 0.125F * (top[2 * x] + top[right] + bottom[2 * x] + bottom[right]);
+      }
     }
   }
 }

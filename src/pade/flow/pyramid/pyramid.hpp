@@ -44,6 +44,8 @@ struct FlowPlanes {
 /// Splits CV_32FC2 of the full size into `flow` at 1 / 2^level of it, averaging blocks; NaN, and what leaves
 /// any image of this size, counts as zero.
 void load_flow(const cv::Mat& vectors, int level, FlowPlanes& flow);
+/// The same at half the size.
+void halve_flow(const FlowPlanes& fine, FlowPlanes& coarse);
 /// Interleaves into CV_32FC2.
 cv::Mat to_vectors(const FlowPlanes& flow);
 
