@@ -14,7 +14,7 @@
 #include "pade/io/formats/cloud_files.hpp"
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
-#include "pade/pipeline/navigation_run.hpp"
+#include "pade/pipeline/poses_from_sensors.hpp"
 #include "pade/pipeline/run_tally.hpp"
 #include "pade/report/accuracy_tables.hpp"
 #include "pade/report/report.hpp"
