@@ -8,6 +8,8 @@
 #include <string>
 #include <utility>
 
+#include <octomap/OcTree.h>
+
 #include "pade/mapping/back_projection.hpp"
 #include "pade/mapping/clearance.hpp"
 #include "pade/mapping/map_update.hpp"
