@@ -6,6 +6,7 @@
 #include "pade/core/depth_image.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/core/result.hpp"
 
 namespace pade::depth {
 
@@ -22,6 +23,8 @@ struct EdgeOptions {
     field("hole", self.hole, "what is smaller than this is not looked for at the epipole, m");
   }
 };
+
+Status check(const EdgeOptions& options);
 
 /// A flow method smears over some pixels: beside an obstacle lie depths between it and the background. Of the
 /// pixels whose neighbourhood (2 radius + 1 pixels squared) holds one that is clearly nearer, no depth is

@@ -68,6 +68,9 @@ struct MapOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const MapOptions& options);
+
 inline constexpr unsigned kTreeDepth = 16;
 
 enum class Occupancy : std::uint8_t { unknown, free, occupied };
@@ -75,9 +78,9 @@ enum class Occupancy : std::uint8_t { unknown, free, occupied };
 /// A voxel, or a cube of 2^k voxels to a side that all have the same state.
 struct MapCell {
   std::array<std::uint16_t, 3> key{};  ///< OctoMap's, of the voxel at the lower corner of the cube
-  unsigned depth = 16;     ///< in the octree; 16 = one voxel
-  Eigen::Vector3f centre;  ///< world, m
-  float side = 0;          ///< m
+  unsigned depth = 16;                 ///< in the octree; 16 = one voxel
+  Eigen::Vector3f centre;              ///< world, m
+  float side = 0;                      ///< m
 };
 
 /// What one depth image changed. In order of position (Morton order), each place once.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
 
 namespace pade::navigation {
 
@@ -123,6 +124,10 @@ struct AlignmentOptions {
     field("lag", self.lag, "the start waits this long for late data, s");
   }
 };
+
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const FilterOptions& options);
+Status check(const AlignmentOptions& options);
 
 }  // namespace pade::navigation
 

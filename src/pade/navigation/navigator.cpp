@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
+#include "pade/core/option_check.hpp"
 #include "pade/navigation/alignment.hpp"
 #include "pade/navigation/timeline.hpp"
 
@@ -258,6 +260,37 @@ Health Navigator::Core::health() {
     health_.seconds_since_position = seconds_between(live_.core().position_accepted, live_.state().time);
   }
   return health_;
+}
+
+Status check(const NavigatorOptions& o) {
+  if (Status status = within("filter", check(o.filter)); !status) return status;
+  if (Status status = within("alignment", check(o.alignment)); !status) return status;
+  constexpr double kFar = 1e3;
+  const OptionRange ranges[] = {
+      {"gnss_lever_arm_x", o.gnss_lever_arm.x(), -kFar, kFar},
+      {"gnss_lever_arm_y", o.gnss_lever_arm.y(), -kFar, kFar},
+      {"gnss_lever_arm_z", o.gnss_lever_arm.z(), -kFar, kFar},
+      {"gnss_position_latency", o.gnss_position_latency, -10, 10},
+      {"gnss_velocity_latency", o.gnss_velocity_latency, -10, 10},
+      {"barometer_latency", o.barometer_latency, -10, 10},
+      {"magnetometer_latency", o.magnetometer_latency, -10, 10},
+      {"camera_time_offset", o.camera_time_offset, -kFar, kFar},
+      {"declination", o.declination, -std::numbers::pi, std::numbers::pi},
+      {"history", o.history, above_zero, 60},
+      {"imu_rate", o.imu_rate, 1, 1e5},
+      {"dead_reckoning_after", o.dead_reckoning_after, above_zero},
+      {"longest_gap", o.longest_gap, above_zero, 60},
+      {"scale_error_limit", o.scale_error_limit, above_zero},
+      {"scale_error_sigmas", o.scale_error_sigmas, 0, finite},
+      {"direction_error_limit", o.direction_error_limit, above_zero},
+      {"direction_error_sigmas", o.direction_error_sigmas, 0, finite},
+  };
+  return check_ranges(ranges);
+}
+
+Result<Navigator> Navigator::create(const NavigatorOptions& options) {
+  if (const Status status = check(options); !status) return status.error();
+  return Navigator(options);
 }
 
 Navigator::Navigator(const NavigatorOptions& options) : core_(std::make_unique<Core>(options)) {}

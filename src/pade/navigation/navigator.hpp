@@ -13,6 +13,7 @@
 
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/core/result.hpp"
 #include "pade/core/sensors/measurements.hpp"
 #include "pade/navigation/filter_options.hpp"
 #include "pade/navigation/measurement.hpp"
@@ -64,6 +65,8 @@ struct NavigatorOptions {
   }
 };
 
+Status check(const NavigatorOptions& options);
+
 enum class NavigationStatus : std::uint8_t {
   uninitialised,
   levelled,   ///< attitude, and yaw with a standard deviation over 0.125 rad or not at all
@@ -114,7 +117,9 @@ struct AbsolutePose {
 
 class Navigator {
  public:
-  explicit Navigator(const NavigatorOptions& options);
+  /// Refuses options that make no sense; the message names the option.
+  static Result<Navigator> create(const NavigatorOptions& options);
+  explicit Navigator(const NavigatorOptions& options);  ///< of options that check() accepts
   Navigator(Navigator&&) noexcept;
   Navigator& operator=(Navigator&&) noexcept;
   ~Navigator();

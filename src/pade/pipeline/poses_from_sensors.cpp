@@ -20,7 +20,7 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
   }
   NavigationRunOptions run_options;
   run_options.navigator = options;
-  run_options.navigator.camera_time_offset = mounting.time_offset;
+  run_options.navigator.camera_time_offset = mounting.time_offset.value_or(options.camera_time_offset);
   run_options.navigator.gnss_lever_arm =
       mounting.gnss_lever_arm.value_or(log->gnss.lever_arm.value_or(options.gnss_lever_arm));
   run_options.frames = frames;
@@ -73,7 +73,7 @@ io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) 
                       "body's sensors",
                       folder.string())};
     }
-    const CameraMounting mounting{*calibration.T_body_camera, calibration.time_offset_s.value_or(0),
+    const CameraMounting mounting{*calibration.T_body_camera, calibration.time_offset_s,
                                   calibration.gnss_lever_arm};
     const auto trajectory = camera_trajectory_from_imu_gnss(folder, images, mounting, options);
     if (!trajectory) return trajectory.error();

@@ -15,7 +15,7 @@ namespace pade {
 /// What of a camera's calibration matters here.
 struct CameraMounting {
   Pose T_body_camera;
-  double time_offset = 0;                         ///< t_imu = t_image + offset, s
+  std::optional<double> time_offset;              ///< t_imu = t_image + offset, s; else what the options say
   std::optional<Eigen::Vector3d> gnss_lever_arm;  ///< body, m; else what the GNSS log says
 };
 
