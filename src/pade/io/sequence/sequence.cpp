@@ -347,7 +347,7 @@ void Sequence::Data::choose_world() {
 
 Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& options,
                                 const PoseSource& source) {
-  if (auto good = check(options); !good) return good.error();
+  if (auto good = io::check(options); !good) return good.error();
   auto data = std::make_unique<Data>();
   data->folder = folder;
   data->options = options;
