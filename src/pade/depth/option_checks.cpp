@@ -31,7 +31,6 @@ Status check(const EdgeOptions& o) {
   const OptionRange ranges[] = {
       {"radius", static_cast<double>(o.radius), 0, 64},
       {"nearness", o.nearness, 0, 1},
-      {"hole", o.hole, 0, finite},
   };
   return check_ranges(ranges);
 }

@@ -115,17 +115,17 @@ std::int32_t Clearance::hole_of(std::int32_t run) {
   return run;
 }
 
-/// Rows of unknown cells, each joined to those of the row above that it touches.
-void Clearance::find_runs(int width, int height) {
+/// Rows of cells that end before `end`, each joined to those of the row above that it touches.
+void Clearance::find_runs(float end, int width, int height) {
   runs_.clear();
   std::size_t above = 0;  // the first run of the row above that may touch
   for (int v = 0; v < height; ++v) {
     const std::size_t begin = runs_.size();
     const float* row = &ends_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width)];
     for (int u = 0; u < width; ++u) {
-      if (!std::isnan(row[u])) continue;
+      if (row[u] >= end) continue;
       const int first = u;
-      while (u < width && std::isnan(row[u])) ++u;
+      while (u < width && !(row[u] >= end)) ++u;
       const auto run = static_cast<std::int32_t>(runs_.size());
       runs_.push_back({v, first, u - 1, run});
       while (above < begin && (runs_[above].row < v - 1 || runs_[above].last + 1 < first)) ++above;
@@ -139,47 +139,35 @@ void Clearance::find_runs(int width, int height) {
   }
 }
 
-float Clearance::nearest_around(const Run& run, int width, int height) const {
-  float nearest = kInfinity;
-  for (int v = std::max(run.row - 1, 0); v <= std::min(run.row + 1, height - 1); ++v) {
-    const float* row = &ends_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width)];
-    for (int u = std::max(run.first - 1, 0); u <= std::min(run.last + 1, width - 1); ++u) {
-      if (row[u] < nearest) nearest = row[u];
+/// A spot of n cells hides nothing larger than n Z / f at depth Z. Up to where that is `hole` it counts as
+/// free where all cells around it are; a spot at the border of the image may go on beyond it.
+void Clearance::close_holes(int width, int height) {
+  constexpr double kNearest = 0.3;  // m: what ends before is not worth the search
+  constexpr double kStep = 1.3;     // from size to size
+  const double reach = parameters_.hole * std::min(camera_.fx, camera_.fy);
+  for (double size = reach / kNearest; size >= 1 && reach / size < parameters_.range; size /= kStep) {
+    const auto end = static_cast<float>(reach / size);
+    find_runs(end, width, height);
+    holes_.assign(runs_.size(), {width, 0, height, 0});
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      const Run& run = runs_[i];
+      Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+      hole = {std::min(hole.left, run.first), std::max(hole.right, run.last), std::min(hole.top, run.row),
+              std::max(hole.bottom, run.row)};
+    }
+    const auto largest = static_cast<int>(size) - 1;
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      const Run& run = runs_[i];
+      const Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+      const bool closed = hole.left > 0 && hole.top > 0 && hole.right < width - 1 &&
+                          hole.bottom < height - 1 && hole.right - hole.left <= largest &&
+                          hole.bottom - hole.top <= largest;
+      if (!closed) continue;
+      float* row = &ends_[static_cast<std::size_t>(run.row) * static_cast<std::size_t>(width)];
+      std::fill(row + run.first, row + run.last + 1, end);
     }
   }
-  return nearest;
-}
-
-/// A hole of n cells hides nothing larger than n Z / f at depth Z. Up to where that is `hole`, and to the
-/// nearest end around it, it counts as free; a hole at the border of the image may go on beyond it.
-void Clearance::close_holes(int width, int height) {
-  find_runs(width, height);
-  holes_.assign(runs_.size(), {width, 0, height, 0, kInfinity});
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
-    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
-    hole = {std::min(hole.left, run.first), std::max(hole.right, run.last), std::min(hole.top, run.row),
-            std::max(hole.bottom, run.row), hole.nearest};
-  }
-  const double reach = parameters_.hole * std::min(camera_.fx, camera_.fy);
-  const auto free_to = [&](const Hole& hole) {
-    if (hole.left == 0 || hole.top == 0 || hole.right == width - 1 || hole.bottom == height - 1) return 0.0F;
-    const int size = std::max(hole.right - hole.left, hole.bottom - hole.top) + 1;
-    return static_cast<float>(reach / size);
-  };
-  constexpr float kTooNear = 0.2F;  // m: not worth the search around a large hole
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
-    if (free_to(hole) > kTooNear)
-      hole.nearest = std::min(hole.nearest, nearest_around(runs_[i], width, height));
-  }
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
-    const Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
-    const float end = free_to(hole) > kTooNear ? std::min(free_to(hole), hole.nearest) : 0.0F;
-    float* row = &ends_[static_cast<std::size_t>(run.row) * static_cast<std::size_t>(width)];
-    std::fill(row + run.first, row + run.last + 1, end);
-  }
+  for (float& end : ends_) end = end >= 0 ? end : 0;
 }
 
 /// Where every voxel within range covers 3 x 3 cells or more, a far end that no 3 x 3 cells around it share

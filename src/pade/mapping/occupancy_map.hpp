@@ -37,7 +37,7 @@ struct MapOptions {
   double clamp_max = 0.971;
   double occupancy_threshold = 0.5;  ///< occupied at and above
   double free_margin_sigmas = 2;     ///< a ray is free up to Z - this many sigma
-  double free_hole = 0.05;           ///< what is smaller is not looked for in pixels that know nothing, m
+  double free_hole = 0.1;            ///< what is smaller is not looked for, m
   double looks_baseline = 0.1;  ///< between the places of the two looks that make a voxel free, and of those
                                 ///< that confirm a far or uncertain hit, m; 0 = one look is enough
   double hit_max_relative_sigma = 0.25;  ///< depths with sigma above this share of Z place no obstacle
@@ -56,7 +56,7 @@ struct MapOptions {
     field("occupancy_threshold", self.occupancy_threshold, "a voxel is occupied at and above");
     field("free_margin_sigmas", self.free_margin_sigmas, "k: a ray is free up to Z - k sigma");
     field("free_hole", self.free_hole,
-          "what is smaller than this is not looked for in pixels that know nothing, m");
+          "spots of short or unknown sight that hide nothing larger than this count as free, m; 0 = none");
     field("looks_baseline", self.looks_baseline,
           "between two looks that make a voxel free or confirm a far or uncertain hit, m; 0 = one look is "
           "enough");
@@ -118,8 +118,8 @@ class OccupancyMap {
   /// looks from other places agree.
   /// - Miss: every pixel that sees the voxel has its bound (or, in an image without bounds, Z - k sigma)
   /// behind the whole voxel, in this image and in one of the last few from at least looks_baseline away.
-  /// Pixels that know nothing leave what lies behind them unknown, but for holes that are smaller than
-  /// free_hole there.
+  /// Pixels that know nothing, or see less far, leave what lies behind them unknown, but for spots whose size
+  /// is below free_hole there.
   /// @param image           variance empty = depth is exact; own_variance empty = variance; state empty =
   /// measured wherever there is depth; bound empty = Z - k sigma of measured pixels
   /// @param camera          pinhole of the image at full size (its distortion is ignored)

@@ -266,7 +266,6 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   if (options_.depth.gates == depth::Gates::on) {
     const Stopwatch watch(update_, Stage::depth);
     depth::guard_edges(update_.depth, options_.edges);
-    depth::close_epipole(update_.depth, camera_, pair.motion, options_.edges.hole);
   }
   update_.depth.time = reference.time;
   update_.reference = reference;
