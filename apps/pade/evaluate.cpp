@@ -13,8 +13,8 @@
 #include "pade/io/options_json.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/io/text.hpp"
-#include "pade/report/accuracy_tables.hpp"
 #include "pade/report/run_evaluation.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
 #include "evaluate_map.hpp"

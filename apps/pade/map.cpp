@@ -13,7 +13,7 @@
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
 #include "pade/pipeline/map_sequence.hpp"
-#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
 #include "enum_option.hpp"

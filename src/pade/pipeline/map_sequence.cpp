@@ -18,8 +18,8 @@
 #include "pade/io/text.hpp"
 #include "pade/pipeline/poses_from_sensors.hpp"
 #include "pade/pipeline/run_tally.hpp"
-#include "pade/report/accuracy_tables.hpp"
 #include "pade/report/report.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 namespace pade {
 namespace {

@@ -1,4 +1,4 @@
-#include "pade/report/map_accuracy_tables.hpp"
+#include "pade/report/tables/map_accuracy_tables.hpp"
 
 #include <cmath>
 #include <functional>
