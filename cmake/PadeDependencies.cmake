@@ -17,7 +17,7 @@ macro(pade_find_dependencies_of)
     pade_find(PadeOpenCV)
     pade_find(Threads)
   endif()
-  if(_pade_rooms MATCHES "mapping|io|pade")
+  if("mapping" IN_LIST _pade_rooms OR "io" IN_LIST _pade_rooms OR "pade" IN_LIST _pade_rooms)
     pade_find(octomap 1.9)
     if(NOT TARGET pade::octomap)  # it comes with variables, or with targets without their include folder
       add_library(pade::octomap INTERFACE IMPORTED)

@@ -106,10 +106,12 @@ Status check(const MapOptions& o) {
   if (!finite_positive(o.range)) return out_of_range("range", o.range, "a positive number of metres");
   if (!(o.p_hit > 0.5 && o.p_hit < 1)) return out_of_range("p_hit", o.p_hit, "above 0.5 and below 1");
   if (!(o.p_miss > 0 && o.p_miss < 0.5)) return out_of_range("p_miss", o.p_miss, "above 0 and below 0.5");
+  if (!(o.clamp_max > 0 && o.clamp_max < 1)) {
+    return out_of_range("clamp_max", o.clamp_max, "above 0 and below 1");
+  }
   if (!(o.clamp_min > 0 && o.clamp_min < o.clamp_max)) {
     return out_of_range("clamp_min", o.clamp_min, "above 0 and below clamp_max");
   }
-  if (!(o.clamp_max < 1)) return out_of_range("clamp_max", o.clamp_max, "below 1");
   if (!(o.occupancy_threshold > o.clamp_min && o.occupancy_threshold < o.clamp_max)) {
     return out_of_range("occupancy_threshold", o.occupancy_threshold, "between clamp_min and clamp_max");
   }
