@@ -126,29 +126,79 @@ TEST(Bounds, AThinPoleIsNeverClearedThrough) {
   }
 }
 
-TEST(Bounds, AHoleHidesWhatIsBehindItOnlyWhereMoreThanFreeHoleFits) {
-  // A hole of n pixels leaves everything unknown behind free_hole f / n.
+TEST(Bounds, ASpotHidesWhatIsBehindItOnlyWhereMoreThanFreeHoleFits) {
+  // A spot of n pixels that knows nothing, or sees to 1 m only, leaves everything unknown behind free_hole f
+  // / n.
   const double f = kCamera.fx;
-  for (const int n : {1, 2, 4}) {
-    MapOptions options;
-    options.looks_baseline = 0;
-    OccupancyMap map = map_of_looks(options);
-    DepthImage image = bounded_to(18);
-    image.bound(cv::Rect(80, 60, n, n)).setTo(kNaN);
-    map.integrate(image, kCamera, level_at(0));
-    const double end = std::min(options.free_hole * f / n, 18.0);
-    const Vector3d ray = level_at(0).rotation * Vector3d((80 + 0.5 * (n - 1) - kCamera.cx) / f,
-                                                         (60 + 0.5 * (n - 1) - kCamera.cy) / f, 1);
-    for (double z = 0.5; z < 17.9; z += 0.05) {
-      const Occupancy state = map.at(level_at(0).translation + z * ray);
-      const bool is_between = z >= end - 0.2 && z <= end;  // within the voxel that the end divides
-      if (is_between) continue;
-      EXPECT_EQ(state, z < end ? Occupancy::free : Occupancy::unknown) << n << " at " << z;
+  for (const int n : {1, 2, 3, 4, 7}) {
+    for (const float sight : {kNaN, 1.0F}) {
+      MapOptions options;
+      options.looks_baseline = 0;
+      OccupancyMap map = map_of_looks(options);
+      DepthImage image = bounded_to(18);
+      image.bound(cv::Rect(80, 60, n, n)).setTo(sight);
+      map.integrate(image, kCamera, level_at(0));
+      const double end = std::min(options.free_hole * f / n, 18.0);
+      const double surely = std::max(std::isnan(sight) ? 0.0 : 1.0, end / 1.3);  // sizes are tried by steps
+      const Vector3d ray = level_at(0).rotation * Vector3d((80 + 0.5 * (n - 1) - kCamera.cx) / f,
+                                                           (60 + 0.5 * (n - 1) - kCamera.cy) / f, 1);
+      for (double z = 0.5; z < 17.9; z += 0.05) {
+        const Occupancy state = map.at(level_at(0).translation + z * ray);
+        if (z < surely - 0.2) {
+          EXPECT_EQ(state, Occupancy::free) << n << " at " << z;
+        }
+        if (z > std::max(end, 1.0) + 0.2) {
+          EXPECT_EQ(state, Occupancy::unknown) << n << " at " << z;
+        }
+      }
     }
   }
 }
 
-TEST(Bounds, AHoleIsFilledWithTheNearestBoundAroundIt) {
+TEST(Bounds, ASpotThatHasMeasuredSomethingIsNotClosed) {
+  MapOptions options;
+  options.looks_baseline = 0;
+  for (const bool is_measured : {true, false}) {
+    OccupancyMap map = map_of_looks(options);
+    DepthImage image = bounded_to(15);
+    image.bound.at<float>(60, 80) = 2;
+    if (is_measured) {
+      image.depth.at<float>(60, 80) = 2.2F;
+      image.state.at<std::uint8_t>(60, 80) = static_cast<std::uint8_t>(DepthState::measured);
+      image.variance.at<float>(60, 80) = image.own_variance.at<float>(60, 80) = 1e-4F;
+    }
+    map.integrate(image, kCamera, level_at(0));
+    const Vector3d ray =
+        level_at(0).rotation * Vector3d((80 - kCamera.cx) / kCamera.fx, (60 - kCamera.cy) / kCamera.fy, 1);
+    EXPECT_EQ(map.at(level_at(0).translation + 3.0 * ray),
+              is_measured ? Occupancy::unknown : Occupancy::free);
+  }
+}
+
+TEST(Bounds, TheBlindSpotAboutTheEpipoleIsClosedAsFarAsItHidesNothing) {
+  // Bounds as parallax of 1 px per metre of motion gives them 0.8 m before a wall at 15 m.
+  MapOptions options;
+  options.looks_baseline = 0;
+  OccupancyMap map = map_of_looks(options);
+  DepthImage image = bounded_to(15);
+  for (int v = 0; v < image.bound.rows; ++v) {
+    for (int u = 0; u < image.bound.cols; ++u) {
+      const double reach = 0.8 * std::hypot(u - 80, v - 60);
+      image.bound.at<float>(v, u) = static_cast<float>(reach / (reach / 15.8 + 0.5));
+    }
+  }
+  map.integrate(image, kCamera, level_at(0));
+  const Vector3d ray =
+      level_at(0).rotation * Vector3d((80 - kCamera.cx) / kCamera.fx, (60 - kCamera.cy) / kCamera.fy, 1);
+  double free_to = 0.6;
+  while (map.at(level_at(0).translation + (free_to + 0.05) * ray) == Occupancy::free) free_to += 0.05;
+  EXPECT_GT(free_to, 1.5);
+  int spot = 0;  // pixels of the row that see less far
+  for (int u = 0; u < image.bound.cols; ++u) spot += image.bound.at<float>(60, u) < free_to - 0.1 ? 1 : 0;
+  EXPECT_LE(spot * free_to / kCamera.fx, options.free_hole + 0.02);
+}
+
+TEST(Bounds, AHoleIsFilledNoFartherThanTheNearestBoundAroundIt) {
   MapOptions options;
   options.looks_baseline = 0;
   OccupancyMap map = map_of_looks(options);
@@ -157,7 +207,7 @@ TEST(Bounds, AHoleIsFilledWithTheNearestBoundAroundIt) {
   image.bound.at<float>(60, 70) = kNaN;
   map.integrate(image, kCamera, level_at(0));
   const Vector3d ray = level_at(0).rotation * Vector3d((70 - kCamera.cx) / kCamera.fx, 0.5 / kCamera.fx, 1);
-  EXPECT_EQ(map.at(level_at(0).translation + 5.0 * ray), Occupancy::free);
+  EXPECT_EQ(map.at(level_at(0).translation + 4.3 * ray), Occupancy::free);
   EXPECT_EQ(map.at(level_at(0).translation + 6.3 * ray), Occupancy::unknown);
 }
 

@@ -55,7 +55,7 @@ struct DepthOptions {
   double residual_angle = 0.25;
   double texture_gate = 3;
   double texture_correlation = 0.5;
-  double bound_sigmas = 3.5;
+  double bound_sigmas = 3.6;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {

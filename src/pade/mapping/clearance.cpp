@@ -90,7 +90,7 @@ void Clearance::set(const DepthImage& image, const Camera& camera, const Pose& T
   }
   // A window that straddles an edge has a depth between the two surfaces: its neighbours know the nearer one.
   if (image.window > 1) nearest_of_neighbours(ends_, scratch_, width, height);
-  close_holes(width, height);
+  close_holes(image.depth);
   drop_lone_ends(width, height);
   build_pyramid(width, height);
 
@@ -139,29 +139,40 @@ void Clearance::find_runs(float end, int width, int height) {
   }
 }
 
+/// The spots that the runs make up: their extent, and whether one of their cells has measured something
+/// before `end`.
+void Clearance::find_holes(const cv::Mat& depth, float end) {
+  holes_.assign(runs_.size(), {depth.cols, 0, depth.rows, 0, false});
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+    const auto* row = depth.ptr<float>(run.row);
+    const bool sees = std::any_of(row + run.first, row + run.last + 1, [&](float z) { return z < end; });
+    hole = {std::min(hole.left, run.first), std::max(hole.right, run.last), std::min(hole.top, run.row),
+            std::max(hole.bottom, run.row), hole.sees_obstacle || sees};
+  }
+}
+
 /// A spot of n cells hides nothing larger than n Z / f at depth Z. Up to where that is `hole` it counts as
-/// free where all cells around it are; a spot at the border of the image may go on beyond it.
-void Clearance::close_holes(int width, int height) {
+/// free where all cells around it are and none of its own has measured anything there; a spot at the border
+/// of the image may go on beyond it.
+void Clearance::close_holes(const cv::Mat& depth) {
   constexpr double kNearest = 0.3;  // m: what ends before is not worth the search
   constexpr double kStep = 1.3;     // from size to size
+  const int width = depth.cols;
+  const int height = depth.rows;
   const double reach = parameters_.hole * std::min(camera_.fx, camera_.fy);
-  for (double size = reach / kNearest; size >= 1 && reach / size < parameters_.range; size /= kStep) {
-    const auto end = static_cast<float>(reach / size);
+  for (double size = reach / kNearest; size >= 1; size /= kStep) {
+    const auto end = static_cast<float>(std::min(reach / std::floor(size), parameters_.range));
     find_runs(end, width, height);
-    holes_.assign(runs_.size(), {width, 0, height, 0});
-    for (std::size_t i = 0; i < runs_.size(); ++i) {
-      const Run& run = runs_[i];
-      Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
-      hole = {std::min(hole.left, run.first), std::max(hole.right, run.last), std::min(hole.top, run.row),
-              std::max(hole.bottom, run.row)};
-    }
-    const auto largest = static_cast<int>(size) - 1;
+    find_holes(depth, end);
+    const int largest = static_cast<int>(size) - 1;
     for (std::size_t i = 0; i < runs_.size(); ++i) {
       const Run& run = runs_[i];
       const Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
       const bool closed = hole.left > 0 && hole.top > 0 && hole.right < width - 1 &&
                           hole.bottom < height - 1 && hole.right - hole.left <= largest &&
-                          hole.bottom - hole.top <= largest;
+                          hole.bottom - hole.top <= largest && !hole.sees_obstacle;
       if (!closed) continue;
       float* row = &ends_[static_cast<std::size_t>(run.row) * static_cast<std::size_t>(width)];
       std::fill(row + run.first, row + run.last + 1, end);

@@ -66,8 +66,10 @@ class Clearance {
   /// Runs that touch, also at corners.
   struct Hole {
     int left, right, top, bottom;
+    bool sees_obstacle;
   };
-  void close_holes(int width, int height);
+  void close_holes(const cv::Mat& depth);
+  void find_holes(const cv::Mat& depth, float end);
   void find_runs(float end, int width, int height);
   [[nodiscard]] std::int32_t hole_of(std::int32_t run);
   void drop_lone_ends(int width, int height);
