@@ -29,8 +29,8 @@ class Experiment : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     root_ = std::make_unique<test::TemporaryFolder>();
-    ASSERT_TRUE(fs::exists(kSampleFlight)) << "run through ctest, or make it: pade sample --frames 5 --out "
-                                     << kSampleFlight;
+    ASSERT_TRUE(fs::exists(kSampleFlight))
+        << "run through ctest, or make it: pade sample --frames 5 --out " << kSampleFlight;
   }
   static void TearDownTestSuite() { root_.reset(); }
 
@@ -52,8 +52,8 @@ class Experiment : public testing::Test {
 
 TEST_F(Experiment, RefusesWhatItDoesNotKnow) {
   expect_refused(experiment(on_flight("table9", "none")), "table9", "none");
-  expect_refused(experiment("table1 --flow magic --sequences " + kSampleFlight + " --out " + at("none")), "magic",
-                 "none");
+  expect_refused(experiment("table1 --flow magic --sequences " + kSampleFlight + " --out " + at("none")),
+                 "magic", "none");
   for (const char* shard : {"0/3", "4/3", "1", "a/b", "1/0", "1.5/3"})
     expect_refused(experiment(on_flight("table1", "none") + " --shard " + shard), "expected i/n", "none");
   expect_refused(experiment("table1 --sequences " + at("nowhere") + " --out " + at("none")), "nowhere",
@@ -71,7 +71,8 @@ TEST_F(Experiment, RefusesASequenceWithoutTruth) {
 }
 
 TEST_F(Experiment, RefusesAPlaceThatCannotBeWritten) {
-  expect_refused(experiment("table1 --sequences " + kSampleFlight + " --out /proc/none"), "/proc/none", "none");
+  expect_refused(experiment("table1 --sequences " + kSampleFlight + " --out /proc/none"), "/proc/none",
+                 "none");
   std::ofstream(root_->path() / "file") << "x";
   const Outcome outcome = experiment("table1 --sequences " + kSampleFlight + " --out " + at("file"));
   EXPECT_EQ(outcome.code, 1);
