@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -11,8 +12,8 @@
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/text.hpp"
-#include "pade/pipeline/navigation_report.hpp"
-#include "pade/pipeline/navigation_run.hpp"
+#include "pade/navigation/navigation_run.hpp"
+#include "pade/report/navigation_report.hpp"
 
 #include "commands.hpp"
 
@@ -61,7 +62,9 @@ Result<NavigationRunOptions> run_options(const Arguments& arguments, const Navig
   return options;
 }
 
-nlohmann::json summary(const NavigationRun& run) {
+using Score = std::optional<evaluation::MotionSummary>;
+
+nlohmann::json summary(const NavigationRun& run, const Score& score) {
   nlohmann::json json = {{"status", std::string(to_name(run.health.status))},
                          {"frames", run.frames.size()},
                          {"frames_without_answer", run.frames_without_answer},
@@ -71,20 +74,20 @@ nlohmann::json summary(const NavigationRun& run) {
                          {"measurements_repeated", run.health.duplicates},
                          {"measurements_unusable", run.health.unusable},
                          {"restarts", run.health.restarts}};
-  if (run.score) {
-    json["against_truth"] = {{"pairs", run.score->pairs},
-                             {"translation_median_m", run.score->translation_median},
-                             {"translation_95_m", run.score->translation_95},
-                             {"rotation_95_deg", run.score->rotation_95 / kDegree},
-                             {"nees_mean", run.score->nees_mean},
-                             {"rotation_nees_mean", run.score->rotation_nees_mean},
-                             {"length_nees_mean", run.score->length_nees_mean},
-                             {"direction_95_deg", run.score->direction_95 / kDegree},
-                             {"direction_nees_mean", run.score->direction_nees_mean},
-                             {"scale_valid_where_good", run.score->valid_where_good},
-                             {"scale_invalid_where_bad", run.score->invalid_where_bad},
-                             {"direction_valid_where_good", run.score->direction_valid_where_good},
-                             {"direction_invalid_where_bad", run.score->direction_invalid_where_bad}};
+  if (score) {
+    json["against_truth"] = {{"pairs", score->pairs},
+                             {"translation_median_m", score->translation_median},
+                             {"translation_95_m", score->translation_95},
+                             {"rotation_95_deg", score->rotation_95 / kDegree},
+                             {"nees_mean", score->nees_mean},
+                             {"rotation_nees_mean", score->rotation_nees_mean},
+                             {"length_nees_mean", score->length_nees_mean},
+                             {"direction_95_deg", score->direction_95 / kDegree},
+                             {"direction_nees_mean", score->direction_nees_mean},
+                             {"scale_valid_where_good", score->valid_where_good},
+                             {"scale_invalid_where_bad", score->invalid_where_bad},
+                             {"direction_valid_where_good", score->direction_valid_where_good},
+                             {"direction_invalid_where_bad", score->direction_invalid_where_bad}};
   }
   return json;
 }
@@ -106,14 +109,15 @@ Status navigate(const Arguments& arguments) {
         "a heading, or GNSS velocities of a vehicle that accelerates",
         arguments.log, to_name(run.health.status))};
   }
-  nlohmann::json json = summary(run);
+  const Score score = score_motions(*log, *options, run);
+  nlohmann::json json = summary(run, score);
   json["remarks"] = log->remarks;
   const std::string title = "Navigation of " + std::filesystem::path(arguments.log).filename().string();
   for (const auto& [file, content] :
        {std::pair<std::string, std::string>{"trajectory.txt", format_trajectory(run)},
         {kMarker, format_relative_motion(run)},
         {"navigation.json", json.dump(2) + "\n"},
-        {"report.html", navigation_report(title, *log, run)}}) {
+        {"report.html", navigation_report(title, *log, run, score)}}) {
     if (Status written = output->write(file, content); !written) return written;
   }
   if (Status committed = output->commit(); !committed) return committed;
@@ -124,12 +128,12 @@ Status navigate(const Arguments& arguments) {
   for (const std::string& remark : log->remarks) fmt::print("{}\n", remark);
   fmt::print("{} frames, {} without a pose; status at the end: {}\n", run.frames.size(),
              run.frames_without_answer, to_name(run.health.status));
-  if (run.score) {
+  if (score) {
     fmt::print(
         "against truth, frame to frame: translation {:.2f} cm median, {:.2f} cm 95 % (NEES {:.2f}); rotation "
         "{:.4f}° 95 % (NEES {:.2f}); 3 is consistent\n",
-        100 * run.score->translation_median, 100 * run.score->translation_95, run.score->nees_mean,
-        run.score->rotation_95 / kDegree, run.score->rotation_nees_mean);
+        100 * score->translation_median, 100 * score->translation_95, score->nees_mean,
+        score->rotation_95 / kDegree, score->rotation_nees_mean);
   }
   fmt::print("{}\n", (std::filesystem::path(arguments.out) / "report.html").string());
   return {};

@@ -31,7 +31,7 @@ Pose level_at(double x, double y = 0.03) {
   return pose;
 }
 
-OccupancyMap new_map(const MapOptions& options = {}) {
+OccupancyMap map_of_looks(const MapOptions& options = {}) {
   return std::move(OccupancyMap::create(options)).value();
 }
 
@@ -70,7 +70,7 @@ std::size_t occupied(const OccupancyMap& map) { return map.counts().occupied; }
 
 TEST(TwoLooks, BoundsAloneClearACorridorAfterTwoPlacesAndNotAfterOne) {
   const DepthImage image = bounded_to(10);
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   const MapChange first = map.integrate(image, kCamera, level_at(0));
   EXPECT_GT(first.pending_free, 10000U);
   for (int i = 0; i < 5; ++i) {
@@ -85,7 +85,7 @@ TEST(TwoLooks, BoundsAloneClearACorridorAfterTwoPlacesAndNotAfterOne) {
 }
 
 TEST(TwoLooks, TheTwoNeedNotBeNeighboursInTime) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   map.integrate(bounded_to(10), kCamera, level_at(0));
   map.integrate(nothing_known(), kCamera, level_at(0.2));
   EXPECT_EQ(map.counts().free, 0U);
@@ -94,7 +94,7 @@ TEST(TwoLooks, TheTwoNeedNotBeNeighboursInTime) {
 }
 
 TEST(TwoLooks, OneOfAnotherPlaceThatSawAnObstacleConfirmsNothing) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   map.integrate(bounded_to(4), kCamera, level_at(0));
   const MapChange change = map.integrate(bounded_to(10), kCamera, level_at(0.2));
   EXPECT_EQ(map.at({3, 0.03, 1.53}), Occupancy::free);
@@ -106,7 +106,7 @@ TEST(Bounds, AThinPoleIsNeverClearedThrough) {
   // A vertical line at (6, 0.08), 2 pixels wide, with a near bound or none, before a wall far behind it; one
   // pixel in 50 of the rest knows nothing.
   for (const bool is_known : {true, false}) {
-    OccupancyMap map = new_map();
+    OccupancyMap map = map_of_looks();
     std::mt19937_64 random(5);
     for (int k = 0; k < 12; ++k) {
       const Pose pose = level_at(0.4 * k, 0.03 + 0.04 * k);
@@ -134,7 +134,7 @@ TEST(Bounds, ASpotHidesWhatIsBehindItOnlyWhereMoreThanFreeHoleFits) {
     for (const float sight : {kNaN, 1.0F}) {
       MapOptions options;
       options.looks_baseline = 0;
-      OccupancyMap map = new_map(options);
+      OccupancyMap map = map_of_looks(options);
       DepthImage image = bounded_to(18);
       image.bound(cv::Rect(80, 60, n, n)).setTo(sight);
       map.integrate(image, kCamera, level_at(0));
@@ -159,7 +159,7 @@ TEST(Bounds, ASpotThatHasMeasuredSomethingIsNotClosed) {
   MapOptions options;
   options.looks_baseline = 0;
   for (const bool is_measured : {true, false}) {
-    OccupancyMap map = new_map(options);
+    OccupancyMap map = map_of_looks(options);
     DepthImage image = bounded_to(15);
     image.bound.at<float>(60, 80) = 2;
     if (is_measured) {
@@ -179,7 +179,7 @@ TEST(Bounds, TheBlindSpotAboutTheEpipoleIsClosedAsFarAsItHidesNothing) {
   // Bounds as parallax of 1 px per metre of motion gives them 0.8 m before a wall at 15 m.
   MapOptions options;
   options.looks_baseline = 0;
-  OccupancyMap map = new_map(options);
+  OccupancyMap map = map_of_looks(options);
   DepthImage image = bounded_to(15);
   for (int v = 0; v < image.bound.rows; ++v) {
     for (int u = 0; u < image.bound.cols; ++u) {
@@ -201,7 +201,7 @@ TEST(Bounds, TheBlindSpotAboutTheEpipoleIsClosedAsFarAsItHidesNothing) {
 TEST(Bounds, AHoleIsFilledNoFartherThanTheNearestBoundAroundIt) {
   MapOptions options;
   options.looks_baseline = 0;
-  OccupancyMap map = new_map(options);
+  OccupancyMap map = map_of_looks(options);
   DepthImage image = bounded_to(15);
   image.bound(cv::Rect(50, 30, 20, 60)).setTo(6);  // a thing with a hole at its edge
   image.bound.at<float>(60, 70) = kNaN;
@@ -214,7 +214,7 @@ TEST(Bounds, AHoleIsFilledNoFartherThanTheNearestBoundAroundIt) {
 TEST(Bounds, AHoleAtTheBorderMayGoOnBeyondIt) {
   MapOptions options;
   options.looks_baseline = 0;
-  OccupancyMap map = new_map(options);
+  OccupancyMap map = map_of_looks(options);
   DepthImage image = bounded_to(15);
   image.bound.at<float>(60, 0) = kNaN;
   map.integrate(image, kCamera, level_at(0));
@@ -227,7 +227,7 @@ TEST(Bounds, AVoxelThatIsHitIsNotClearedByTheSameImage) {
   // Bounds that contradict the depth.
   MapOptions options;
   options.looks_baseline = 0;
-  OccupancyMap map = new_map(options);
+  OccupancyMap map = map_of_looks(options);
   DepthImage image = wall(5.04, 0, 0);
   image.bound.setTo(12);
   map.integrate(image, kCamera, level_at(0));
@@ -237,7 +237,7 @@ TEST(Bounds, AVoxelThatIsHitIsNotClearedByTheSameImage) {
 }
 
 TEST(Bounds, OneThatContradictsAnObstacleDoesNotClearIt) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   map.integrate(bounded_to(12), kCamera, level_at(0));
   map.integrate(wall(5.04, 0, 0), kCamera, level_at(0.2));
   const Vector3d point(5.24, 0.03, 1.53);
@@ -249,11 +249,11 @@ TEST(Bounds, OneThatContradictsAnObstacleDoesNotClearIt) {
 }
 
 TEST(Hits, ANearGoodOneIsAnObstacleAtOnceAndAFarOneWaitsForAnotherPlace) {
-  OccupancyMap near = new_map();
+  OccupancyMap near = map_of_looks();
   near.integrate(wall(5.04, 0.02, 0), kCamera, level_at(0));
   EXPECT_GT(occupied(near), 500U);
 
-  OccupancyMap far = new_map();
+  OccupancyMap far = map_of_looks();
   for (int i = 0; i < 4; ++i) {
     const MapChange change = far.integrate(wall(12.04, 0.02, 0), kCamera, level_at(0));
     EXPECT_EQ(occupied(far), 0U);
@@ -264,7 +264,7 @@ TEST(Hits, ANearGoodOneIsAnObstacleAtOnceAndAFarOneWaitsForAnotherPlace) {
 }
 
 TEST(Hits, ASigmaThatIsCommonToTheImageMovesTheSurfaceAndDoesNotRemoveIt) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   for (int k = 0; k < 4; ++k)
     map.integrate(wall(10.04 - 0.2 * k, 0.02, 0.5, 1, kLarge), kLarge, level_at(0.2 * k));
   EXPECT_EQ(map.at({10.04, 0.03, 1.53}), Occupancy::occupied);
@@ -273,7 +273,7 @@ TEST(Hits, ASigmaThatIsCommonToTheImageMovesTheSurfaceAndDoesNotRemoveIt) {
 
 TEST(Hits, UncertainOnesAddUpToASurfaceWhereItIs) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    OccupancyMap map = new_map();
+    OccupancyMap map = map_of_looks();
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     map.integrate(wall(6.04, 0.3, 0, seed, kLarge), kLarge, level_at(0));
@@ -290,7 +290,7 @@ TEST(Hits, UncertainOnesAddUpToASurfaceWhereItIs) {
 }
 
 TEST(Hits, ADepthThatIsLessCertainThanTheRelativeLimitIsCountedAndPlacesNothing) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   for (int k = 0; k < 5; ++k) {
     const MapChange change = map.integrate(wall(5, 0.1, 1.5), kCamera, level_at(0.2 * k));
     EXPECT_EQ(change.too_uncertain, static_cast<std::size_t>(kCamera.width) * kCamera.height);
@@ -301,7 +301,7 @@ TEST(Hits, ADepthThatIsLessCertainThanTheRelativeLimitIsCountedAndPlacesNothing)
 
 TEST(Hits, ThoseThatWaitAreForgottenBehindTheVehicle) {
   // Walls that are never at the same place again, over 30 m.
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   std::size_t most_early = 0;
   std::size_t most_late = 0;
   for (int k = 0; k < 60; ++k) {

@@ -4,6 +4,7 @@
 
 #include "pade/core/depth_image.hpp"
 #include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
 
 namespace pade::depth {
 
@@ -18,6 +19,8 @@ struct EdgeOptions {
           "a pixel beside one that is nearer than this share of its depth belongs to neither surface");
   }
 };
+
+Status check(const EdgeOptions& options);
 
 /// A flow method smears over some pixels: beside an obstacle lie depths between it and the background. Of the
 /// pixels whose neighbourhood (2 radius + 1 pixels squared) holds one that is clearly nearer, no depth is

@@ -3,6 +3,8 @@
 // docs/mapping.md.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,13 +12,18 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <octomap/OcTree.h>
 
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
+
+// OctoMap's headers cost more than all of this one: whoever uses tree() includes <octomap/OcTree.h>.
+namespace octomap {
+class OcTree;
+class OcTreeNode;
+}  // namespace octomap
 
 namespace pade::mapping {
 
@@ -61,16 +68,19 @@ struct MapOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const MapOptions& options);
+
 inline constexpr unsigned kTreeDepth = 16;
 
 enum class Occupancy : std::uint8_t { unknown, free, occupied };
 
 /// A voxel, or a cube of 2^k voxels to a side that all have the same state.
 struct MapCell {
-  octomap::OcTreeKey key;  ///< of the voxel at the lower corner of the cube
-  unsigned depth = 16;     ///< in the octree; 16 = one voxel
-  Eigen::Vector3f centre;  ///< world, m
-  float side = 0;          ///< m
+  std::array<std::uint16_t, 3> key{};  ///< OctoMap's, of the voxel at the lower corner of the cube
+  unsigned depth = 16;                 ///< in the octree; 16 = one voxel
+  Eigen::Vector3f centre;              ///< world, m
+  float side = 0;                      ///< m
 };
 
 /// What one depth image changed. In order of position (Morton order), each place once.

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/text.hpp"
+
 namespace pade::io {
 namespace {
 
@@ -39,7 +41,7 @@ std::optional<FlowPair> pair_in(const fs::path& folder) {
     }
   }
   if (truths.size() != 1 || images.size() != 2) return std::nullopt;
-  const fs::path normal = fs::absolute(folder).lexically_normal();
+  const fs::path normal = absolute_path(folder).lexically_normal();
   const fs::path name = normal.has_filename() ? normal.filename() : normal.parent_path().filename();
   return FlowPair{name.string(), images[0], images[1], truths[0]};
 }
