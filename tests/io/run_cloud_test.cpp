@@ -40,7 +40,11 @@ INSTANTIATE_TEST_SUITE_P(Of, CloudFile,
                                                   return encode_ply(cloud, "world: +z is up\nunits: m");
                                                 },
                                                 decode_ply},
-                                         Format{"Pcd", encode_pcd, decode_pcd}),
+                                         Format{"Pcd",
+                                                [](const PointCloud& cloud) {
+                                                  return encode_pcd(cloud, "world: +z is up\nunits: m");
+                                                },
+                                                decode_pcd}),
                          [](const auto& instance) { return instance.param.name; });
 
 }  // namespace

@@ -116,8 +116,8 @@ Reason outside_reason(const RunInfo& info) {
   return {fmt::format("the octree reaches {:.0f} m from the origin with voxels of {:g} m, and the poses lie "
                       "farther away (map coordinates such as UTM?)",
                       32768 * info.map->voxel, info.map->voxel),
-          "subtract a constant from the positions in the pose file so that the flight begins near 0, or take "
-          "larger voxels (--voxel)"};
+          "let the run be made around a point near the flight (--origin flight), or take larger voxels "
+          "(--voxel)"};
 }
 
 Reason beyond_reason(const RunInfo& info) {
@@ -179,9 +179,11 @@ void add_of_map(const RunInfo& info, List& list) {
   }
   const std::uint64_t in_range = depths_in_range(map);
   const std::uint64_t sure = in_range - map.depths_uncertain;
-  if (const double outside = share(map.points_outside, sure); outside > kSomeFrames) {
+  if (map.points_outside > 0) {
     list.add("outside-map", HintSeverity::warning,
-             fmt::format("{} of the points lie outside the map", percent(outside)), outside_reason(info));
+             fmt::format("{} of the points lie outside the map and were lost",
+                         percent(share(map.points_outside, sure))),
+             outside_reason(info));
   }
   if (const double uncertain = share(map.depths_uncertain, in_range); uncertain > kManyUncertain) {
     list.add("mostly-uncertain", HintSeverity::warning,

@@ -62,8 +62,14 @@ Result<Calibration> with_overrides(Calibration base, const fs::path& folder, con
   if (path_exists(folder / "camera.yaml")) files.push_back(folder / "camera.yaml");
   if (!choice.calibration_file.empty()) files.push_back(choice.calibration_file);
   for (const fs::path& file : files) {
-    const auto read = read_calibration(file);
+    const bool asked_for = !choice.calibration_file.empty() && file == files.back();
+    const auto read = read_calibration(file, asked_for ? choice.camera : 0);
     if (!read) return read.error();
+    if (asked_for && !read->camera) {
+      return Error{fmt::format("{}: found no camera in it, expected the calibration that was asked for (known "
+                               "dialects: docs/formats.md)",
+                               file.string())};
+    }
     override_with(base, *read);
     for (const std::string& field : read->unknown_fields) {
       report.notes.push_back(fmt::format("{}: field {} is unknown and was ignored", file.string(), field));

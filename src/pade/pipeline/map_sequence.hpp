@@ -23,6 +23,7 @@ struct MapSequenceOptions {
   navigation::ImuClass imu = navigation::ImuClass::industrial;
   mapping::CloudOptions cloud;
   bool pcd = false;
+  bool world_coordinates = false;
   bool report = true;
 
   template <class Self, class Visitor>
@@ -32,6 +33,9 @@ struct MapSequenceOptions {
     field("imu", self.imu, "industrial | consumer: class of the IMU where poses are from-imu-gnss");
     field("cloud", self.cloud, "the point cloud of the run");
     field("pcd", self.pcd, "also writes cloud.pcd");
+    field("world_coordinates", self.world_coordinates,
+          "also writes the clouds and the trajectory with the local origin added: cloud_world.ply, "
+          "trajectory_world.txt");
     field("report", self.report, "writes report.html");
   }
 };
