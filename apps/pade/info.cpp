@@ -183,7 +183,7 @@ void print_sequence(const io::Sequence& sequence, const SequenceCheck& check) {
          check.truth_depth->least, check.truth_depth->most);
   }
   if (const auto& up = sequence.world_up()) {
-    line("up", "{} ({}{})", direction_text(up->direction), up->stated ? "stated" : "guessed from the cameras",
+    line("up", "{} ({}{})", direction_text(up->direction), up->stated ? std::string("stated") : "guessed from " + up->source,
          check.up_disagreement
              ? fmt::format("; cameras' mean up {:.0f} deg from it", *check.up_disagreement * kDegrees)
              : "");

@@ -63,6 +63,37 @@ std::span<const FrameMotion> longest_chain(std::span<const FrameMotion> motions)
 
 }  // namespace
 
+Result<CheckedLog> read_checked_log(const std::filesystem::path& folder, const io::NavigationLogOptions& options) {
+  auto log = io::read_navigation_log(folder, options);
+  if (!log) return log.error();
+  CheckedLog checked{std::move(*log), {}};
+  auto regularised = navigation::regularise_stamps(checked.log.imu);
+  checked.hints = navigation::check_log(checked.log);
+  if (regularised) checked.hints.push_back(std::move(*regularised));
+  return checked;
+}
+
+std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run) {
+  std::vector<Hint> hints = checked.hints;
+  const auto of_run = navigation::check_run(run.sensors, run.health, checked.log.imu.size());
+  hints.insert(hints.end(), of_run.begin(), of_run.end());
+  std::stable_sort(hints.begin(), hints.end(),
+                   [](const Hint& a, const Hint& b) { return a.severity > b.severity; });
+  return hints;
+}
+
+Error never_aligned(const std::string& folder, const CheckedLog& checked, const NavigationRun& run) {
+  std::string text = fmt::format("{}: the filter never found its attitude and yaw (status: {})", folder,
+                                 to_name(run.health.status));
+  const std::vector<Hint> hints = all_hints(checked, run);
+  for (const Hint& hint : hints) text += fmt::format("\n  {}\n  -> {}", hint.message, hint.advice);
+  if (hints.empty()) {
+    text += ", expected two seconds at rest and a heading, or GNSS velocities of a vehicle that accelerates";
+  }
+  for (const std::string& remark : checked.log.remarks) text += "\n  " + remark;
+  return Error{text};
+}
+
 NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOptions& options) {
   NavigationRun run;
   navigation::Navigator navigator(options.navigator);
@@ -92,6 +123,7 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
   });
   run.frames_without_answer += frames.size() - next;
   run.health = navigator.health();
+  run.sensors = navigation::summarise(run.measurements);
   run.score = score_motions(log, options, run.motions);
   return run;
 }
@@ -135,8 +167,9 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
                                                          const std::vector<Time>& frames,
                                                          const CameraMounting& mounting,
                                                          const navigation::NavigatorOptions& options) {
-  const auto log = io::read_navigation_log(folder);
-  if (!log) return log.error();
+  const auto checked = read_checked_log(folder);
+  if (!checked) return checked.error();
+  const NavigationLog* const log = &checked->log;
   if (log->gnss.velocities.empty() || log->gnss.fixes.empty()) {
     return Error{fmt::format("{}: no GNSS positions and velocities found, expected them in gnss.csv",
                              folder.string())};
@@ -153,6 +186,7 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
   CameraTrajectory trajectory;
   trajectory.origin = log->gnss.origin;
   trajectory.health = run.health;
+  trajectory.hints = all_hints(*checked, run);
   const std::span<const FrameMotion> chain = longest_chain(run.motions);
   if (!chain.empty()) {
     const Time start = chain.front().t1;
@@ -171,14 +205,14 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
     trajectory.direction_valid.push_back(m.pose.direction_valid);
   }
   if (trajectory.times.empty()) {
-    return Error{fmt::format("{}: the filter never knew its yaw within the {} frames (status: {})",
-                             folder.string(), frames.size(), to_name(run.health.status))};
+    return never_aligned(folder.string(), *checked, run);
   }
   return trajectory;
 }
 
 std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
   std::vector<std::string> notes;
+  for (const Hint& hint : trajectory.hints) notes.push_back(fmt::format("{} -> {}", hint.message, hint.advice));
   const auto motions = trajectory.motions.size();
   const auto false_of = [](const std::vector<bool>& flags) {
     return std::count(flags.begin(), flags.end(), false);

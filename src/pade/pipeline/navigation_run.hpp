@@ -13,6 +13,7 @@
 #include "pade/io/navigation_log.hpp"
 #include "pade/io/sequence.hpp"
 #include "pade/navigation/navigator.hpp"
+#include "pade/navigation/plausibility.hpp"
 
 namespace pade {
 
@@ -44,9 +45,25 @@ struct NavigationRun {
   std::vector<FrameMotion> motions;                   ///< of neighbouring frames with an answer
   std::vector<navigation::Measurement> measurements;  ///< each with its last innovation
   navigation::Health health;
+  std::vector<navigation::SensorSummary> sensors;
   std::size_t frames_without_answer = 0;
   std::optional<evaluation::MotionSummary> score;  ///< body motion against log.truth, where there is truth
 };
+
+/// A log, and what should be known of it before its results are relied on.
+struct CheckedLog {
+  NavigationLog log;
+  std::vector<Hint> hints;  ///< worst first
+};
+/// Reads a log folder, puts jittering IMU stamps on a line (navigation::regularise_stamps) and checks the log
+/// (navigation::check_log). Errors: io::read_navigation_log.
+Result<CheckedLog> read_checked_log(const std::filesystem::path& folder, const io::NavigationLogOptions& options = {});
+
+/// The hints of a log and those of its run, worst first.
+std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run);
+
+/// Why a run has no frame: its status, and the hints of the log.
+Error never_aligned(const std::string& folder, const CheckedLog& checked, const NavigationRun& run);
 
 /// Plays the whole log in the order of its stamps. Every frame is answered causally, as in flight.
 NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOptions& options);
@@ -67,6 +84,7 @@ struct CameraTrajectory {
   std::size_t frames_left = 0;           ///< with an answer, but not in the longest unbroken chain
   std::optional<GeodeticOrigin> origin;  ///< of the world, where the GNSS log has one
   navigation::Health health;
+  std::vector<Hint> hints;  ///< of log and run, worst first
 };
 
 /// What of a camera's calibration matters here.
