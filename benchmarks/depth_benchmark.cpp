@@ -7,8 +7,8 @@
 
 #include "pade/depth/depth_estimator.hpp"
 #include "pade/depth/derotation.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 namespace pade::depth {
 namespace {

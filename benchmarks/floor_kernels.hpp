@@ -1,7 +1,7 @@
 // Loops that show what the machine can do at best, for comparison with the flow kernels.
 #pragma once
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 
 namespace pade::flow {
 

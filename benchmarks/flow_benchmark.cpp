@@ -7,8 +7,8 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "pade/core/simd.hpp"
-#include "pade/flow/epipolar.hpp"
+#include "pade/core/compute/simd.hpp"
+#include "pade/flow/epipolar/epipolar.hpp"
 #include "pade/flow/flow_estimator.hpp"
 
 namespace {

@@ -5,10 +5,10 @@
 
 #include <benchmark/benchmark.h>
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 #include "pade/flow/kernels/pyramid_kernels.hpp"
-#include "pade/flow/plane.hpp"
-#include "pade/flow/pyramid.hpp"
+#include "pade/flow/pyramid/plane.hpp"
+#include "pade/flow/pyramid/pyramid.hpp"
 
 #include "floor_kernels.hpp"
 

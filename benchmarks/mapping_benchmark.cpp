@@ -9,11 +9,11 @@
 #include <benchmark/benchmark.h>
 #include <octomap/OcTree.h>
 
-#include "pade/io/map_files.hpp"
+#include "pade/io/formats/map_files.hpp"
 #include "pade/mapping/back_projection.hpp"
 #include "pade/mapping/occupancy_map.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 namespace pade::mapping {
 namespace {

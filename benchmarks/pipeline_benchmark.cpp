@@ -3,8 +3,8 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pade/pipeline/obstacle_mapper.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 namespace pade {
 namespace {

@@ -16,12 +16,12 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "pade/core/simd.hpp"
-#include "pade/flow/epipolar.hpp"
+#include "pade/core/compute/simd.hpp"
+#include "pade/flow/epipolar/epipolar.hpp"
 #include "pade/flow/flow_estimator.hpp"
-#include "pade/io/flow_file.hpp"
+#include "pade/io/formats/flow_file.hpp"
 
-#include "flow/forward_flight.hpp"
+#include "flow/epipolar/forward_flight.hpp"
 
 namespace {
 

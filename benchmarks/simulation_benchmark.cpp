@@ -12,11 +12,11 @@
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
-#include "pade/simulation/image_formation.hpp"
-#include "pade/simulation/paper_set.hpp"
-#include "pade/simulation/renderer.hpp"
-#include "pade/simulation/sdf_reader.hpp"
-#include "pade/simulation/truth.hpp"
+#include "pade/simulation/generator/paper_set.hpp"
+#include "pade/simulation/render/image_formation.hpp"
+#include "pade/simulation/render/renderer.hpp"
+#include "pade/simulation/render/truth.hpp"
+#include "pade/simulation/sdf/sdf_reader.hpp"
 
 namespace pade::simulation {
 namespace {

@@ -9,11 +9,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pade/evaluation/accuracy_tables.hpp"
-#include "pade/evaluation/run_evaluation.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/sequence/sequence.hpp"
+#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/run_evaluation.hpp"
 
 #include "commands.hpp"
 #include "evaluate_map.hpp"

@@ -14,17 +14,17 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 
-#include "pade/evaluation/map_accuracy_tables.hpp"
-#include "pade/evaluation/map_ceiling.hpp"
+#include "pade/evaluation/map/map_ceiling.hpp"
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/map_files.hpp"
+#include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
-#include "pade/io/run_reader.hpp"
-#include "pade/io/trajectory.hpp"
+#include "pade/io/run/run_reader.hpp"
+#include "pade/io/sequence/trajectory.hpp"
 #include "pade/pipeline/map_replay.hpp"
-#include "pade/simulation/sdf_reader.hpp"
-#include "pade/simulation/truth.hpp"
-#include "pade/simulation/world_solids.hpp"
+#include "pade/report/map_accuracy_tables.hpp"
+#include "pade/simulation/render/truth.hpp"
+#include "pade/simulation/sdf/sdf_reader.hpp"
+#include "pade/simulation/world/world_solids.hpp"
 
 #include "progress.hpp"
 
@@ -159,8 +159,9 @@ Status measure_maps(const OpenRun& run, const KnownWorld& world, const EvaluateM
     return Error{fmt::format("{}: found no such file, expected the map", map_file.string())};
   const auto map = io::read_map(map_file, run.options.mapper.map);
   if (!map) return map.error();
-  const Pose T_map_world = accuracy.alignment ? accuracy.alignment->T_map_world
-                                              : Pose{Eigen::Quaterniond::Identity(), -run.run.info.local_origin};
+  const Pose T_map_world = accuracy.alignment
+                               ? accuracy.alignment->T_map_world
+                               : Pose{Eigen::Quaterniond::Identity(), -run.run.info.local_origin};
   const evaluation::PlacedSurface in_map(world.truth.surface, T_map_world);
   const evaluation::PlacedSurface in_world(world.truth.surface);
   evaluation::SeenSurface seen(accuracy.voxel, accuracy.seen_depth);

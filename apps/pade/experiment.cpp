@@ -13,15 +13,15 @@
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/text.hpp"
-#include "pade/pipeline/experiment_finish.hpp"
-#include "pade/pipeline/experiment_run.hpp"
+#include "pade/paper/experiment/experiment_run.hpp"
+#include "pade/paper/tables/experiment_finish.hpp"
 
 #include "cache.hpp"
 #include "commands.hpp"
 #include "progress.hpp"
 
 #ifdef PADE_HAS_SIMULATION
-#include "pade/simulation/paper_set_files.hpp"
+#include "pade/simulation/generator/paper_set_files.hpp"
 #endif
 
 namespace pade::cli {

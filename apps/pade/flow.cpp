@@ -8,8 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "pade/flow/flow_estimator.hpp"
-#include "pade/io/flow_file.hpp"
-#include "pade/io/flow_picture.hpp"
+#include "pade/io/formats/flow_file.hpp"
+#include "pade/io/formats/flow_picture.hpp"
 
 #include "commands.hpp"
 #include "grey_image.hpp"

@@ -14,9 +14,9 @@
 #include "pade/evaluation/flow_accuracy.hpp"
 #include "pade/evaluation/flow_truth.hpp"
 #include "pade/flow/flow_estimator.hpp"
-#include "pade/io/flow_file.hpp"
-#include "pade/io/flow_pairs.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/formats/flow_file.hpp"
+#include "pade/io/formats/flow_pairs.hpp"
+#include "pade/io/sequence/sequence.hpp"
 
 #include "commands.hpp"
 #include "flow_table.hpp"

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 
 namespace pade::cli {
 namespace {

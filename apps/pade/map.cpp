@@ -7,13 +7,13 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "pade/evaluation/accuracy_tables.hpp"
-#include "pade/evaluation/run_hints.hpp"
+#include "pade/checks/run_hints.hpp"
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
 #include "pade/pipeline/map_sequence.hpp"
+#include "pade/report/accuracy_tables.hpp"
 
 #include "commands.hpp"
 #include "enum_option.hpp"
@@ -231,9 +231,10 @@ void add_map(CLI::App& app, Context& context) {
   map->add_option("--world-up", a->world_up, "axis of the pose world that points up: +x -x +y -y +z -z");
   map->add_option("--camera", a->camera, "which camera of a calibration file that holds several, from 0")
       ->check(CLI::Range(0, 99));
-  map->add_option("--origin", a->origin,
-                  "point of the pose world that is 0 0 0 of the run: auto (default: near the flight where that\n"
-                  "is farther than 1 km from 0 0 0, as in UTM), flight, none, or \"x y z\"");
+  map->add_option(
+      "--origin", a->origin,
+      "point of the pose world that is 0 0 0 of the run: auto (default: near the flight where that\n"
+      "is farther than 1 km from 0 0 0, as in UTM), flight, none, or \"x y z\"");
   map->add_flag("--world-coordinates", a->world_coordinates,
                 "also write cloud and trajectory in the coordinates of the poses (cloud_world.ply ...)");
   map->add_option("--save", a->save, "image stacks to write: any of depth,sigma,state,bound,flow");

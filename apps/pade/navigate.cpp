@@ -8,10 +8,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pade/evaluation/run_hints.hpp"
+#include "pade/checks/run_hints.hpp"
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/calibration.hpp"
-#include "pade/io/navigation_log.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
+#include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
 #include "pade/pipeline/navigation_report.hpp"
@@ -53,8 +53,9 @@ Status set_mounting(const Arguments& arguments, NavigationRunOptions& options) {
     const auto calibration = io::read_calibration(arguments.calibration, arguments.camera);
     if (!calibration) return calibration.error();
     if (!calibration->T_body_camera) {
-      return Error{fmt::format("{}: found no mounting of the camera in it, expected T_body_camera, T_BS or T_cam_imu",
-                               arguments.calibration)};
+      return Error{
+          fmt::format("{}: found no mounting of the camera in it, expected T_body_camera, T_BS or T_cam_imu",
+                      arguments.calibration)};
     }
     options.T_body_camera = *calibration->T_body_camera;
     options.navigator.camera_time_offset = calibration->time_offset_s.value_or(0);
@@ -178,8 +179,8 @@ Status navigate(const Arguments& arguments) {
   fmt::print("{} frames, {} without a pose; status at the end: {}\n", run.frames.size(),
              run.frames_without_answer, to_name(run.health.status));
   for (const auto& sensor : run.sensors) {
-    fmt::print("{}: {} measurements, {} refused, mean χ² {:.2f} per component (1 is consistent)\n", sensor.sensor,
-               sensor.measurements, sensor.refused, sensor.chi_square);
+    fmt::print("{}: {} measurements, {} refused, mean χ² {:.2f} per component (1 is consistent)\n",
+               sensor.sensor, sensor.measurements, sensor.refused, sensor.chi_square);
   }
   if (run.score) {
     fmt::print(
@@ -197,7 +198,9 @@ Status navigate(const Arguments& arguments) {
 void add_navigate(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("navigate", "Trajectory and frame-to-frame motion from IMU and GNSS");
   auto arguments = std::make_shared<Arguments>();
-  command->add_option("log", arguments->log, "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md)")
+  command
+      ->add_option("log", arguments->log,
+                   "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md)")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, where there are several");
@@ -219,12 +222,14 @@ void add_navigate(CLI::App& app, Context& context) {
                                                  "Known yaw at the start, degrees from east towards north");
   command->add_option("--heading-sigma", arguments->heading_sigma, "Its standard deviation, degrees")
       ->capture_default_str();
-  command->add_option("--gnss-latency", arguments->gnss_latency, "Seconds that the stamps of the GNSS are late")
+  command
+      ->add_option("--gnss-latency", arguments->gnss_latency, "Seconds that the stamps of the GNSS are late")
       ->capture_default_str()
       ->check(CLI::Range(-100.0, 100.0));
   arguments->velocity_latency_given =
-      command->add_option("--gnss-velocity-latency", arguments->velocity_latency,
-                          "The same of its velocities, where they differ from the positions")
+      command
+          ->add_option("--gnss-velocity-latency", arguments->velocity_latency,
+                       "The same of its velocities, where they differ from the positions")
           ->check(CLI::Range(-100.0, 100.0));
   command->add_option("--baro-latency", arguments->barometer_latency, "The same of the barometer")
       ->check(CLI::Range(-100.0, 100.0));
@@ -232,11 +237,13 @@ void add_navigate(CLI::App& app, Context& context) {
       ->check(CLI::Range(-100.0, 100.0));
   command->add_option("--lever-arm", arguments->lever_arm,
                       "Antenna in the body frame, \"x,y,z\": forward, left, up, m (else what the logs say)");
-  command->add_option("--declination", arguments->declination,
-                      "Of magnetic north, from north towards east, degrees")
+  command
+      ->add_option("--declination", arguments->declination,
+                   "Of magnetic north, from north towards east, degrees")
       ->check(CLI::Range(-180.0, 180.0));
-  command->add_option("--calibration", arguments->calibration,
-                      "Calibration whose camera the motions are of: its mounting and time offset (else the body's)");
+  command->add_option(
+      "--calibration", arguments->calibration,
+      "Calibration whose camera the motions are of: its mounting and time offset (else the body's)");
   command->add_option("--camera", arguments->camera, "Which camera of it, from 0")->check(CLI::Range(0, 99));
   command->add_flag("--force", arguments->force, "Replace an earlier output");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");

@@ -14,9 +14,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/trajectory.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/io/sequence/trajectory.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 #include "commands.hpp"
 #include "progress.hpp"

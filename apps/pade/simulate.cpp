@@ -15,11 +15,11 @@
 
 #ifdef PADE_HAS_SIMULATION
 #include "pade/io/atomic_output.hpp"
-#include "pade/simulation/paper_set.hpp"
-#include "pade/simulation/paper_set_files.hpp"
-#include "pade/simulation/sdf_reader.hpp"
-#include "pade/simulation/simulated_sequence.hpp"
-#include "pade/simulation/world_generator.hpp"
+#include "pade/simulation/flight/simulated_sequence.hpp"
+#include "pade/simulation/generator/paper_set.hpp"
+#include "pade/simulation/generator/paper_set_files.hpp"
+#include "pade/simulation/generator/world_generator.hpp"
+#include "pade/simulation/sdf/sdf_reader.hpp"
 
 #include "progress.hpp"
 #endif

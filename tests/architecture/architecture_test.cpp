@@ -1,6 +1,7 @@
 // Holds the sources to the rules of docs/design.md that a program can check.
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <regex>
 #include <string>
 #include <vector>
@@ -69,6 +70,35 @@ TEST(Architecture, ARoomIncludesOnlyWhatTheDesignAllows) {
   }
   EXPECT_THAT(broken, IsEmpty());
   EXPECT_GT(includes, 50) << "the sources were not found";
+}
+
+TEST(Architecture, EveryPermissionInTheDesignIsUsed) {
+  Rules unused = rules_of(read(kRoot / "docs" / "design.md"));
+  for (const fs::path& file : sources_under(kRoot / "src" / "pade")) {
+    const std::string room = file.lexically_relative(kRoot / "src" / "pade").begin()->string();
+    for (const std::string& header : pade_includes(read(file))) {
+      unused[room].erase(header);
+      unused[room].erase(header.substr(0, header.find('/')));
+    }
+  }
+  std::vector<std::string> permissions;
+  for (const auto& [room, headers] : unused) {
+    for (const std::string& header : headers) permissions.push_back(room + " may include " + header);
+  }
+  EXPECT_THAT(permissions, IsEmpty());
+}
+
+TEST(Architecture, AFolderHasAtMost20Files) {
+  std::map<std::string, int> files;
+  for (const char* tree : {"src", "apps", "tests", "benchmarks"}) {
+    for (const fs::path& file : sources_under(kRoot / tree)) ++files[shown(file.parent_path())];
+  }
+  std::vector<std::string> crowded;
+  for (const auto& [folder, count] : files) {
+    if (count > 20) crowded.push_back(folder + ": " + std::to_string(count));
+  }
+  EXPECT_THAT(crowded, IsEmpty());
+  EXPECT_GT(files.size(), 20U) << "the folders were not found";
 }
 
 TEST(Architecture, RoomsDoNotDependOnEachOtherInACircle) {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 #include "depth/depth_scene.hpp"
 

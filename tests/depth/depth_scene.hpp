@@ -7,8 +7,8 @@
 #include "pade/core/pose.hpp"
 #include "pade/core/random.hpp"
 #include "pade/depth/depth_estimator.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 namespace pade::depth {
 

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pade/flow/opencv_adapter.hpp"
+#include "pade/flow/methods/opencv_adapter.hpp"
 
 #include "flow/flow_scene.hpp"
 

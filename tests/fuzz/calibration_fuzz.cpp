@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "pade/io/calibration.hpp"
+#include "pade/io/sequence/calibration.hpp"
 
 #include "expect.hpp"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "pade/simulation/flight.hpp"
+#include "pade/simulation/flight/flight.hpp"
 
 #include "expect.hpp"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "pade/io/flow_file.hpp"
+#include "pade/io/formats/flow_file.hpp"
 
 #include "expect.hpp"
 #include "same_flow.hpp"

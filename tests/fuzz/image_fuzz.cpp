@@ -5,7 +5,7 @@
 
 #include <unistd.h>
 
-#include "pade/io/image_file.hpp"
+#include "pade/io/sequence/image_file.hpp"
 
 #include "expect.hpp"
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pade/io/navigation_log.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
 
 #include "expect.hpp"
 

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pade/io/sequence_layout.hpp"
-#include "pade/io/trajectory.hpp"
+#include "pade/io/sequence/layouts/sequence_layout.hpp"
+#include "pade/io/sequence/trajectory.hpp"
 
 #include "expect.hpp"
 

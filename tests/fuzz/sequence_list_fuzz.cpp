@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "pade/io/sequence_layout.hpp"
+#include "pade/io/sequence/layouts/sequence_layout.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
 

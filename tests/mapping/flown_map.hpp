@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "pade/mapping/occupancy_map.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 namespace pade::mapping {
 

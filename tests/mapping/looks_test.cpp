@@ -10,7 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "pade/mapping/occupancy_map.hpp"
-#include "pade/simulation/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
 
 #include "mapping/flown_map.hpp"
 

@@ -13,10 +13,10 @@
 #include <octomap/OcTree.h>
 #include <opencv2/core.hpp>
 
-#include "pade/io/map_files.hpp"
+#include "pade/io/formats/map_files.hpp"
 #include "pade/mapping/back_projection.hpp"
 #include "pade/mapping/occupancy_map.hpp"
-#include "pade/simulation/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
 
 #include "mapping/flown_map.hpp"
 

@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "pade/mapping/back_projection.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 #include "mapping/flown_map.hpp"
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "pade/core/navigation_log.hpp"
-#include "pade/simulation/sensors/aiding.hpp"
-#include "pade/simulation/sensors/imu.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
+#include "pade/simulation/flight/sensors/aiding.hpp"
+#include "pade/simulation/flight/sensors/imu.hpp"
 
 namespace pade::navigation {
 

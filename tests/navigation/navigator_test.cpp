@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "pade/navigation/replay.hpp"
-#include "pade/pipeline/navigation_protocol.hpp"
+#include "pade/paper/navigation_protocol.hpp"
 
 #include "navigation/flight.hpp"
 

@@ -6,9 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "navigation/flight.hpp"
 #include "pade/navigation/force_match.hpp"
 #include "pade/navigation/replay.hpp"
+
+#include "navigation/flight.hpp"
 
 namespace pade::navigation {
 namespace {
@@ -40,7 +41,8 @@ TEST(LogCheck, HasNothingToSayOfGoodLogs) {
   for (const double speed : {0.3, 1.0, 2.0}) {
     for (const std::uint64_t seed : {1U, 2U, 3U}) {
       const auto hints = check_log(good(speed, seed));
-      EXPECT_THAT(hints, IsEmpty()) << speed << ' ' << seed << ": " << (hints.empty() ? "" : hints[0].message);
+      EXPECT_THAT(hints, IsEmpty()) << speed << ' ' << seed << ": "
+                                    << (hints.empty() ? "" : hints[0].message);
     }
   }
 }
@@ -53,7 +55,8 @@ TEST(LogCheck, KnowsDegreesPerSecondInGentleFlight) {
 
 TEST(LogCheck, KnowsGyroscopesInOtherAxesThanAccelerometers) {
   auto log = good();
-  for (ImuSample& sample : log.imu) sample.angular_rate = sample.angular_rate.cwiseProduct(Vector3d(1, -1, -1));
+  for (ImuSample& sample : log.imu)
+    sample.angular_rate = sample.angular_rate.cwiseProduct(Vector3d(1, -1, -1));
   EXPECT_THAT(check_log(log), has("gyro-axes"));
 }
 
@@ -69,7 +72,8 @@ TEST(LogCheck, KnowsForwardRightDownCalledForwardLeftUp) {
 TEST(LogCheck, KnowsNorthEastDownCalledEastNorthUp) {
   // The flight of the other tests hardly climbs: what tells is the vertical.
   auto log = good(2);
-  for (GnssVelocity& v : log.gnss.velocities) v.velocity = Vector3d(v.velocity.y(), v.velocity.x(), -v.velocity.z());
+  for (GnssVelocity& v : log.gnss.velocities)
+    v.velocity = Vector3d(v.velocity.y(), v.velocity.x(), -v.velocity.z());
   EXPECT_THAT(check_log(log), has("gnss-axes"));
 }
 
@@ -91,7 +95,8 @@ TEST(LogCheck, KnowsLeapSeconds) {
 
 TEST(LogCheck, KnowsPositionsInDegrees) {
   auto log = good(2);
-  for (GnssFix& fix : log.gnss.fixes) fix.position = {47 + fix.position.x() * 1e-5, 8 + fix.position.y() * 1e-5, 400};
+  for (GnssFix& fix : log.gnss.fixes)
+    fix.position = {47 + fix.position.x() * 1e-5, 8 + fix.position.y() * 1e-5, 400};
   EXPECT_THAT(check_log(log), has("gnss-degrees"));
 }
 

@@ -11,10 +11,10 @@
 
 #include <gtest/gtest.h>
 
-#include "pade/io/navigation_log.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
 #include "pade/pipeline/navigation_run.hpp"
-#include "pade/simulation/flight.hpp"
-#include "pade/simulation/sensor_files.hpp"
+#include "pade/simulation/flight/flight.hpp"
+#include "pade/simulation/flight/sensor_files.hpp"
 
 namespace pade {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "pade/pipeline/map_sequence.hpp"
 #include "pade/pipeline/navigation_run.hpp"
-#include "pade/simulation/simulated_sequence.hpp"
+#include "pade/simulation/flight/simulated_sequence.hpp"
 
 namespace pade {
 namespace {

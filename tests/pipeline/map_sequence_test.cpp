@@ -10,10 +10,10 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "pade/io/run_reader.hpp"
-#include "pade/io/trajectory.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/io/run/run_reader.hpp"
+#include "pade/io/sequence/trajectory.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 namespace pade {
 namespace {

@@ -13,9 +13,9 @@
 #include <gtest/gtest.h>
 
 #include "pade/core/random.hpp"
-#include "pade/io/map_files.hpp"
-#include "pade/simulation/analytic_flights.hpp"
-#include "pade/simulation/analytic_render.hpp"
+#include "pade/io/formats/map_files.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
 
 namespace pade {
 namespace {

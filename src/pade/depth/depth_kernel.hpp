@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 
 namespace pade::depth {
 

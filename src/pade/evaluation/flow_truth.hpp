@@ -9,7 +9,7 @@
 #include "pade/core/camera.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/sequence/sequence.hpp"
 
 namespace pade::evaluation {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "pade/core/navigation_log.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
 #include "pade/core/time.hpp"
 
 namespace pade::evaluation {

@@ -4,10 +4,10 @@
 #include <limits>
 #include <utility>
 
-#include "pade/flow/clg.hpp"
-#include "pade/flow/farneback.hpp"
-#include "pade/flow/lucas_kanade.hpp"
-#include "pade/flow/opencv_estimators.hpp"
+#include "pade/flow/methods/clg.hpp"
+#include "pade/flow/methods/farneback.hpp"
+#include "pade/flow/methods/lucas_kanade.hpp"
+#include "pade/flow/methods/opencv_estimators.hpp"
 
 namespace pade::flow {
 namespace {

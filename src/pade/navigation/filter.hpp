@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdint>
 
-#include "pade/core/measurements.hpp"
+#include "pade/core/sensors/measurements.hpp"
 #include "pade/navigation/filter_options.hpp"
 #include "pade/navigation/filter_state.hpp"
 #include "pade/navigation/imu_increment.hpp"

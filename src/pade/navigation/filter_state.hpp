@@ -4,8 +4,8 @@
 // δb_g, δb_a, δb_p (GNSS position bias, ENU), δb_h (barometer zero) and δh (the vehicle's iron), additive.
 #pragma once
 
+#include "pade/core/lie.hpp"
 #include "pade/core/time.hpp"
-#include "pade/navigation/lie.hpp"
 
 namespace pade::navigation {
 

@@ -14,16 +14,16 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.80665;   // m/s²
-constexpr double kLongest = 300;       // s of the log that are looked at
-constexpr double kWindow = 5;          // s: drift of a gyroscope of 0.05 rad/s turns by a few degrees
-constexpr double kInterval = 0.4;      // s between the velocities of an interval, at least
+constexpr double kGravity = 9.80665;  // m/s²
+constexpr double kLongest = 300;      // s of the log that are looked at
+constexpr double kWindow = 5;         // s: drift of a gyroscope of 0.05 rad/s turns by a few degrees
+constexpr double kInterval = 0.4;     // s between the velocities of an interval, at least
 constexpr double kLongestInterval = 1.6;
 constexpr std::size_t kLeastIntervals = 3;  // per window
-constexpr double kGap = 0.1;           // s without IMU samples
+constexpr double kGap = 0.1;                // s without IMU samples
 
-/// What the best rotation leaves of sum |a - R b|² (Markley, "Attitude determination using vector observations and
-/// the singular value decomposition", 1988).
+/// What the best rotation leaves of sum |a - R b|² (Markley, "Attitude determination using vector
+/// observations and the singular value decomposition", 1988).
 double residual_of(const Matrix3d& correlation, double squares) {
   const Eigen::JacobiSVD<Matrix3d> svd(correlation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() > 0 ? 1 : -1;

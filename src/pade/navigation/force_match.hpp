@@ -1,4 +1,5 @@
-// How well inertial data and GNSS velocities belong together, without a filter: Wahba's problem over short windows.
+// How well inertial data and GNSS velocities belong together, without a filter: Wahba's problem over short
+// windows.
 #pragma once
 
 #include <optional>
@@ -7,19 +8,20 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "pade/core/navigation_log.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
 
 namespace pade::navigation {
 
 /// Another reading of the same data.
 struct Reading {
-  double gyroscope_scale = 1;       ///< times the angular rate
-  bool gyroscope_turned = false;    ///< y and z of the angular rate have the other sign
-  bool velocity_of_ned = false;     ///< the velocities are north, east, down
+  double gyroscope_scale = 1;     ///< times the angular rate
+  bool gyroscope_turned = false;  ///< y and z of the angular rate have the other sign
+  bool velocity_of_ned = false;   ///< the velocities are north, east, down
 };
 
-/// The mean specific force of an interval between two GNSS velocities, turned by the integrated gyroscopes to the
-/// start, and the change of the velocity over the interval plus gravity, are the same vector but for one rotation.
+/// The mean specific force of an interval between two GNSS velocities, turned by the integrated gyroscopes to
+/// the start, and the change of the velocity over the interval plus gravity, are the same vector but for one
+/// rotation.
 class ForceMatch {
  public:
   /// Looks at the first minutes of the log.
@@ -38,14 +40,14 @@ class ForceMatch {
 
  private:
   struct Interval {
-    double from = 0, to = 0;               ///< s after zero_
-    Eigen::Vector3d force;                 ///< change of velocity per second plus gravity, m/s²
+    double from = 0, to = 0;  ///< s after zero_
+    Eigen::Vector3d force;    ///< change of velocity per second plus gravity, m/s²
   };
   [[nodiscard]] Eigen::Vector3d integrated_to(double t) const;
 
   Time zero_;
-  std::vector<double> times_;                  ///< of the samples, s after zero_
-  std::vector<Eigen::Vector3d> integral_;      ///< of the turned specific force, m/s
+  std::vector<double> times_;              ///< of the samples, s after zero_
+  std::vector<Eigen::Vector3d> integral_;  ///< of the turned specific force, m/s
   std::vector<std::vector<Interval>> windows_;
 };
 

@@ -3,7 +3,7 @@
 // propagation with applications to preintegration", ICRA 2020; docs/navigation.md, section 2).
 #pragma once
 
-#include "pade/navigation/lie.hpp"
+#include "pade/core/lie.hpp"
 
 namespace pade::navigation {
 

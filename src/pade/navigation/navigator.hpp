@@ -10,9 +10,9 @@
 #include <optional>
 #include <string_view>
 
-#include "pade/core/measurements.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/core/sensors/measurements.hpp"
 #include "pade/navigation/alignment.hpp"
 #include "pade/navigation/timeline.hpp"
 

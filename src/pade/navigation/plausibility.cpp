@@ -22,7 +22,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-void add(std::vector<Hint>& hints, std::string id, HintSeverity severity, std::string message, std::string advice) {
+void add(std::vector<Hint>& hints, std::string id, HintSeverity severity, std::string message,
+         std::string advice) {
   hints.push_back({std::move(id), severity, std::move(message), std::move(advice)});
 }
 
@@ -45,15 +46,16 @@ Span span_of(const Samples& samples) {
 
 void check_overlap(const NavigationLog& log, std::vector<Hint>& hints) {
   const Span imu = span_of(log.imu);
-  const std::array<std::pair<const char*, Span>, 4> others = {{{"GNSS velocities", span_of(log.gnss.velocities)},
-                                                               {"GNSS positions", span_of(log.gnss.fixes)},
-                                                               {"barometer", span_of(log.barometer)},
-                                                               {"magnetometer", span_of(log.magnetometer)}}};
+  const std::array<std::pair<const char*, Span>, 4> others = {
+      {{"GNSS velocities", span_of(log.gnss.velocities)},
+       {"GNSS positions", span_of(log.gnss.fixes)},
+       {"barometer", span_of(log.barometer)},
+       {"magnetometer", span_of(log.magnetometer)}}};
   for (const auto& [name, span] : others) {
     if (imu.empty() || span.empty()) continue;
     const double common = std::min(imu.last, span.last) - std::max(imu.first, span.first);
-    const std::string covers = fmt::format("{} cover {:.1f} to {:.1f} s, the IMU {:.1f} to {:.1f} s", name, span.first,
-                                           span.last, imu.first, imu.last);
+    const std::string covers = fmt::format("{} cover {:.1f} to {:.1f} s, the IMU {:.1f} to {:.1f} s", name,
+                                           span.first, span.last, imu.first, imu.last);
     if (common <= 0) {
       add(hints, "no-overlap", HintSeverity::error, covers + ": no overlap",
           "the clocks differ: give all logs the same zero, or the stamps of one are in another unit");
@@ -71,7 +73,8 @@ void check_stamps_go_back(const std::vector<ImuSample>& imu, std::vector<Hint>& 
     const double step = seconds_between(imu[i - 1].time, imu[i].time);
     if (step > -kReset) continue;
     add(hints, "stamps-go-back", HintSeverity::error,
-        fmt::format("the stamps of the IMU go back by {:.3f} s at sample {} of {}, from {:.3f} to {:.3f} s: its clock "
+        fmt::format("the stamps of the IMU go back by {:.3f} s at sample {} of {}, from {:.3f} to {:.3f} s: "
+                    "its clock "
                     "was set anew, and every sample until it has caught up is refused",
                     -step, i + 1, imu.size(), imu[i - 1].time.seconds(), imu[i].time.seconds()),
         "cut the log there, or add the jump to the stamps behind it");
@@ -86,8 +89,7 @@ void check_rate(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) {
   std::vector<double> bends;
   for (std::size_t i = 2; i < imu.size(); ++i) {
     steps.push_back(seconds_between(imu[i - 1].time, imu[i].time));
-    const Vector3d bend =
-        imu[i].specific_force - 2 * imu[i - 1].specific_force + imu[i - 2].specific_force;
+    const Vector3d bend = imu[i].specific_force - 2 * imu[i - 1].specific_force + imu[i - 2].specific_force;
     bends.push_back(bend.norm());
   }
   if (steps.size() < 100) return;
@@ -96,9 +98,10 @@ void check_rate(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) {
   const double spread = median(std::move(bends)) / (1.538 * std::sqrt(6.0));
   if (rate > kSlow || spread < kVibration) return;
   add(hints, "imu-picked", HintSeverity::warning,
-      fmt::format("the IMU has {:.0f} samples per second that differ by {:.1f} m/s² from one to the next: they look "
-                  "picked from a faster stream, so that vibration appears as motion",
-                  rate, spread),
+      fmt::format(
+          "the IMU has {:.0f} samples per second that differ by {:.1f} m/s² from one to the next: they look "
+          "picked from a faster stream, so that vibration appears as motion",
+          rate, spread),
       "log the IMU at its full rate, or its integrated increments, or filter before picking");
 }
 
@@ -109,7 +112,8 @@ void check_upright(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) 
   mean /= static_cast<double>(imu.size());
   if (mean.z() > -0.8 * mean.norm() || mean.norm() < 5) return;
   add(hints, "upside-down", HintSeverity::warning,
-      fmt::format("the mean specific force is {:.1f} m/s² along the body's z, which is up: the vehicle would fly upside "
+      fmt::format("the mean specific force is {:.1f} m/s² along the body's z, which is up: the vehicle would "
+                  "fly upside "
                   "down",
                   mean.z()),
       "where the log is in forward, right, down, write '# frame=FRD' into its first line");
@@ -126,7 +130,8 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
   for (const GnssFix& fix : gnss.fixes) {
     for (; next < gnss.velocities.size() && gnss.velocities[next].time <= fix.time; ++next) {
       const GnssVelocity& v = gnss.velocities[next];
-      if (before != nullptr) flown += 0.5 * seconds_between(before->time, v.time) * (before->velocity + v.velocity);
+      if (before != nullptr)
+        flown += 0.5 * seconds_between(before->time, v.time) * (before->velocity + v.velocity);
       before = &v;
     }
     farthest = std::max(farthest, fix.position.head<2>().cwiseAbs().maxCoeff());
@@ -148,17 +153,19 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
   const double scale = along / flown2;
   const double agreement = along / std::sqrt(moved2 * flown2 + 1e-12);
   if (std::sqrt(moved2 / flown2) < 1e-3 && farthest <= 360) {
-    return add(hints, "gnss-degrees", HintSeverity::error,
-               fmt::format("the velocities fly {:.0f} m while the positions move by {:.2g} of that: they look like "
-                           "latitude and longitude",
-                           path, std::sqrt(moved2 / flown2)),
-               "name the columns lat, lon, alt, and they become metres around the first fix");
+    return add(
+        hints, "gnss-degrees", HintSeverity::error,
+        fmt::format("the velocities fly {:.0f} m while the positions move by {:.2g} of that: they look like "
+                    "latitude and longitude",
+                    path, std::sqrt(moved2 / flown2)),
+        "name the columns lat, lon, alt, and they become metres around the first fix");
   }
   if (along_swapped > 1.3 * std::max(along, 0.0) && along_swapped > 0.7 * std::sqrt(moved2 * flown2)) {
-    return add(hints, "gnss-axes", HintSeverity::error,
-               "the velocities fit the positions when read as north, east, down: positions and velocities are in "
-               "different axes",
-               "name the columns (pE pN pU, vN vE vD), so that each is read in its own axes");
+    return add(
+        hints, "gnss-axes", HintSeverity::error,
+        "the velocities fit the positions when read as north, east, down: positions and velocities are in "
+        "different axes",
+        "name the columns (pE pN pU, vN vE vD), so that each is read in its own axes");
   }
   if (agreement > 0.8 && scale > 0.7 && scale < 1.4) return;
   const std::string unit = agreement > 0.8 && scale > 0.24 && scale < 0.32   ? " (km/h?)"
@@ -166,7 +173,8 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
                            : agreement > 0.8 && scale < 0.02                 ? " (cm/s?)"
                                                                              : "";
   add(hints, "gnss-contradiction", HintSeverity::error,
-      fmt::format("positions and velocities of the GNSS do not belong together: the positions move by {:.2f} of what the "
+      fmt::format("positions and velocities of the GNSS do not belong together: the positions move by {:.2f} "
+                  "of what the "
                   "velocities fly{}, with an agreement of {:.2f} (1 is the same)",
                   scale, unit, agreement),
       "see which of the two is wrong: axes, unit (m/s), or the clock of one of them");
@@ -209,26 +217,30 @@ void check_readings(const NavigationLog& log, std::vector<Hint>& hints) {
     }
   }
   if (best != nullptr) {
-    return add(hints, best->id, HintSeverity::error,
-               fmt::format("IMU and GNSS contradict each other by {:.1f} m/s² as given, and by {:.2f} m/s² {}", as_given,
-                           least, best->what),
-               best->advice);
+    return add(
+        hints, best->id, HintSeverity::error,
+        fmt::format("IMU and GNSS contradict each other by {:.1f} m/s² as given, and by {:.2f} m/s² {}",
+                    as_given, least, best->what),
+        best->advice);
   }
   if (const auto lag = given.lag(); lag) {
     const bool leap = std::abs(std::abs(lag->seconds) - 18) < 1 || std::abs(std::abs(lag->seconds) - 37) < 1;
-    return add(hints, "gnss-lag", std::abs(lag->seconds) > 1 ? HintSeverity::error : HintSeverity::warning,
-               fmt::format("the GNSS velocities are {:.2f} s {}: IMU and GNSS contradict each other by {:.2f} m/s² as "
-                           "stamped, and by {:.2f} m/s² when moved by that{}",
-                           std::abs(lag->seconds), lag->seconds > 0 ? "late" : "early", as_given, lag->misfit,
-                           leap ? "; this looks like the leap seconds between GPS time and UTC (18 s) or TAI (37 s)" : ""),
-               fmt::format("give the latency (--gnss-latency {:.2f}), or correct the stamps", lag->seconds));
+    return add(
+        hints, "gnss-lag", std::abs(lag->seconds) > 1 ? HintSeverity::error : HintSeverity::warning,
+        fmt::format(
+            "the GNSS velocities are {:.2f} s {}: IMU and GNSS contradict each other by {:.2f} m/s² as "
+            "stamped, and by {:.2f} m/s² when moved by that{}",
+            std::abs(lag->seconds), lag->seconds > 0 ? "late" : "early", as_given, lag->misfit,
+            leap ? "; this looks like the leap seconds between GPS time and UTC (18 s) or TAI (37 s)" : ""),
+        fmt::format("give the latency (--gnss-latency {:.2f}), or correct the stamps", lag->seconds));
   }
   constexpr double kHopeless = 3;  // m/s²
   if (as_given > kHopeless) {
     add(hints, "imu-contradiction", HintSeverity::error,
-        fmt::format("IMU and GNSS contradict each other by {:.1f} m/s² (flights of good logs: under 1), and neither "
-                    "another unit, other axes nor a lag explains it",
-                    as_given),
+        fmt::format(
+            "IMU and GNSS contradict each other by {:.1f} m/s² (flights of good logs: under 1), and neither "
+            "another unit, other axes nor a lag explains it",
+            as_given),
         "check the columns, axes and units of imu.csv, and that both logs are of the same flight");
   }
 }
@@ -290,7 +302,9 @@ std::optional<Hint> regularise_stamps(std::vector<ImuSample>& samples) {
   double largest = 0;
   for (std::size_t begin = 0; begin < samples.size();) {
     std::size_t end = begin + 1;
-    while (end < samples.size() && seconds_between(samples[end - 1].time, samples[end].time) < 30 * usual + 0.1) ++end;
+    while (end < samples.size() &&
+           seconds_between(samples[end - 1].time, samples[end].time) < 30 * usual + 0.1)
+      ++end;
     // A line through stamp over number.
     const double n = static_cast<double>(end - begin);
     const Time zero = samples[begin].time;
@@ -310,11 +324,13 @@ std::optional<Hint> regularise_stamps(std::vector<ImuSample>& samples) {
     }
     begin = end;
   }
-  return Hint{"imu-stamps-regularised", HintSeverity::warning,
-              fmt::format("{} of {} stamps of the IMU repeat or go back: they were put on a straight line ({:.1f} Hz), "
-                          "moved by at most {:.1f} ms",
-                          falling, samples.size(), 1 / usual, 1e3 * largest),
-              "log the stamps of the sensor itself, with microseconds"};
+  return Hint{
+      "imu-stamps-regularised", HintSeverity::warning,
+      fmt::format(
+          "{} of {} stamps of the IMU repeat or go back: they were put on a straight line ({:.1f} Hz), "
+          "moved by at most {:.1f} ms",
+          falling, samples.size(), 1 / usual, 1e3 * largest),
+      "log the stamps of the sensor itself, with microseconds"};
 }
 
 std::vector<SensorSummary> summarise(std::span<const Measurement> measurements) {
@@ -325,7 +341,8 @@ std::vector<SensorSummary> summarise(std::span<const Measurement> measurements) 
     const auto kind = static_cast<std::size_t>(m.kind);
     SensorSummary& sum = sums[kind];
     ++sum.measurements;
-    if (m.innovation.verdict == Verdict::rejected || m.innovation.verdict == Verdict::reacquired) ++sum.refused;
+    if (m.innovation.verdict == Verdict::rejected || m.innovation.verdict == Verdict::reacquired)
+      ++sum.refused;
     sum.chi_square += m.innovation.chi_square;
     freedom[kind] += m.innovation.size;
   }
@@ -339,7 +356,8 @@ std::vector<SensorSummary> summarise(std::span<const Measurement> measurements) 
   return out;
 }
 
-std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health& health, std::size_t imu_samples) {
+std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health& health,
+                            std::size_t imu_samples) {
   std::vector<Hint> hints;
   constexpr double kSomeRefused = 0.05;
   const double refused_imu =
@@ -357,21 +375,23 @@ std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health
     constexpr double kInconsistent = 10;  // times what the sigmas allow
     if (refused > kMostRefused) {
       add(hints, "sensor-refused", HintSeverity::error,
-          fmt::format("{:.0f} % of {} were refused by the filter (mean χ² {:.3g} per component, 1 is consistent)",
-                      100 * refused, sensor.sensor, sensor.chi_square),
+          fmt::format(
+              "{:.0f} % of {} were refused by the filter (mean χ² {:.3g} per component, 1 is consistent)",
+              100 * refused, sensor.sensor, sensor.chi_square),
           sensor.sensor == "barometer"
               ? "check that height_m is in metres and up; leave baro.csv out where it disturbs"
               : "check clock, axes, units and sigmas of this sensor, and the lever arm (--lever-arm)");
     } else if (sensor.chi_square > kInconsistent) {
       add(hints, "inconsistent", HintSeverity::warning,
-          fmt::format("{} disagree with the filter: mean χ² {:.3g} per component where 1 is consistent", sensor.sensor,
-                      sensor.chi_square),
+          fmt::format("{} disagree with the filter: mean χ² {:.3g} per component where 1 is consistent",
+                      sensor.sensor, sensor.chi_square),
           "check clock, axes and units of this sensor; sigmas that are too small look like this too");
     }
   }
   if (health.restarts > 0) {
     add(hints, "restarts", HintSeverity::warning,
-        fmt::format("the filter had to start anew {} times: the IMU log has gaps that cannot be bridged", health.restarts),
+        fmt::format("the filter had to start anew {} times: the IMU log has gaps that cannot be bridged",
+                    health.restarts),
         "record without gaps of more than 3 s");
   }
   return hints;

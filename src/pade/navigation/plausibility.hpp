@@ -1,5 +1,5 @@
-// Whether a log can be what it claims to be: units, axes, clocks. Cheap, before and after every run of the filter,
-// so that a hopeless run never looks like a good one.
+// Whether a log can be what it claims to be: units, axes, clocks. Cheap, before and after every run of the
+// filter, so that a hopeless run never looks like a good one.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pade/core/hint.hpp"
-#include "pade/core/navigation_log.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
 #include "pade/navigation/navigator.hpp"
 
 namespace pade::navigation {
@@ -28,14 +28,14 @@ namespace pade::navigation {
 ///   gnss-contradiction positions and velocities of the GNSS do not belong together
 ///   imu-contradiction  IMU and GNSS do not belong together, and no reading above explains it
 ///
-/// How: over windows of 5 s the mean specific force, turned by the integrated gyroscopes, and the change of the
-/// GNSS velocity plus gravity are the same vectors but for one rotation (Wahba's problem). What is left over says
-/// which reading of the data is right.
+/// How: over windows of 5 s the mean specific force, turned by the integrated gyroscopes, and the change of
+/// the GNSS velocity plus gravity are the same vectors but for one rotation (Wahba's problem). What is left
+/// over says which reading of the data is right.
 std::vector<Hint> check_log(const NavigationLog& log);
 
-/// Stamps of an IMU that jitter, repeat or swap (a clock of milliseconds, samples that arrive in packets) put on
-/// straight lines between gaps, in place. Nothing happens where they rise, and where a clock was set back. The hint
-/// says what was done; empty where nothing was.
+/// Stamps of an IMU that jitter, repeat or swap (a clock of milliseconds, samples that arrive in packets) put
+/// on straight lines between gaps, in place. Nothing happens where they rise, and where a clock was set back.
+/// The hint says what was done; empty where nothing was.
 std::optional<Hint> regularise_stamps(std::vector<ImuSample>& samples);
 
 /// What the filter made of one sensor.
@@ -53,6 +53,7 @@ std::vector<SensorSummary> summarise(std::span<const Measurement> measurements);
 ///   sensor-refused     most of a sensor refused (a barometer for ever)
 ///   inconsistent       a sensor disagrees with the filter far beyond its sigma
 ///   restarts           the filter had to start anew
-std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health& health, std::size_t imu_samples);
+std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health& health,
+                            std::size_t imu_samples);
 
 }  // namespace pade::navigation

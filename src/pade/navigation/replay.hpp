@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "pade/core/navigation_log.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
 #include "pade/navigation/navigator.hpp"
 
 namespace pade::navigation {

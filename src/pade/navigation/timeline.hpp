@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "pade/core/measurements.hpp"
+#include "pade/core/sensors/measurements.hpp"
 #include "pade/navigation/filter.hpp"
 #include "pade/navigation/ring.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "pade/core/frame.hpp"
 #include "pade/core/result.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/sequence/sequence.hpp"
 #include "pade/pipeline/map_sequence.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 

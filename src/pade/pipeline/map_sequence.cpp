@@ -11,15 +11,15 @@
 
 #include <fmt/format.h>
 
+#include "pade/checks/run_hints.hpp"
 #include "pade/core/version.hpp"
-#include "pade/evaluation/accuracy_tables.hpp"
-#include "pade/evaluation/report.hpp"
-#include "pade/evaluation/run_hints.hpp"
-#include "pade/io/cloud_files.hpp"
-#include "pade/io/map_files.hpp"
+#include "pade/io/formats/cloud_files.hpp"
+#include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/pipeline/navigation_run.hpp"
 #include "pade/pipeline/run_tally.hpp"
+#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/report.hpp"
 
 namespace pade {
 namespace {
@@ -195,10 +195,10 @@ class Run {
   Status write(const MapResult& result) {
     const Eigen::Vector3d& shift = result.info.local_origin;
     const std::string world = "world frame of " + result.info.poses + " (metres)";
-    const std::string frame =
-        shift.isZero(0) ? world
-                        : fmt::format("{}\nlocal origin {} {} {}: add it to get back to that frame", world,
-                                      shift.x(), shift.y(), shift.z());
+    const std::string frame = shift.isZero(0)
+                                  ? world
+                                  : fmt::format("{}\nlocal origin {} {} {}: add it to get back to that frame",
+                                                world, shift.x(), shift.y(), shift.z());
     std::vector<std::pair<std::string, std::string>> files = {
         {"cloud.ply", io::encode_ply(cloud_.cloud(), frame)},
         {"map.bt", io::encode_map(mapper_.map(), io::MapFormat::bt)},
@@ -239,7 +239,7 @@ class Run {
   std::map<Time, cv::Mat> truths_;  // of the frames whose depth may still come
   std::vector<io::Skipped> undecodable_;
   std::vector<Eigen::Vector3d> path_;
-  std::vector<io::StampedPose> world_path_;  // where options_.world_coordinates
+  std::vector<io::StampedPose> world_path_;         // where options_.world_coordinates
   Eigen::Vector3d look_ = Eigen::Vector3d::Zero();  // optical axis at the last pose
   std::array<std::vector<double>, stage_names.size()> milliseconds_;
   std::size_t used_ = 0;

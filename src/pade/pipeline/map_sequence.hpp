@@ -7,9 +7,9 @@
 
 #include "pade/core/result.hpp"
 #include "pade/evaluation/depth_accuracy.hpp"
-#include "pade/io/run_info.hpp"
-#include "pade/io/run_writer.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/run/run_info.hpp"
+#include "pade/io/run/run_writer.hpp"
+#include "pade/io/sequence/sequence.hpp"
 #include "pade/mapping/cloud_builder.hpp"
 #include "pade/navigation/filter_options.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "pade/evaluation/report_style.hpp"
+#include "pade/report/report_style.hpp"
 
 namespace pade {
 namespace {

@@ -63,7 +63,8 @@ std::span<const FrameMotion> longest_chain(std::span<const FrameMotion> motions)
 
 }  // namespace
 
-Result<CheckedLog> read_checked_log(const std::filesystem::path& folder, const io::NavigationLogOptions& options) {
+Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
+                                    const io::NavigationLogOptions& options) {
   auto log = io::read_navigation_log(folder, options);
   if (!log) return log.error();
   CheckedLog checked{std::move(*log), {}};
@@ -212,7 +213,8 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
 
 std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
   std::vector<std::string> notes;
-  for (const Hint& hint : trajectory.hints) notes.push_back(fmt::format("{} -> {}", hint.message, hint.advice));
+  for (const Hint& hint : trajectory.hints)
+    notes.push_back(fmt::format("{} -> {}", hint.message, hint.advice));
   const auto motions = trajectory.motions.size();
   const auto false_of = [](const std::vector<bool>& flags) {
     return std::count(flags.begin(), flags.end(), false);

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "pade/core/navigation_log.hpp"
 #include "pade/core/result.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
 #include "pade/evaluation/navigation_score.hpp"
-#include "pade/io/navigation_log.hpp"
-#include "pade/io/sequence.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
+#include "pade/io/sequence/sequence.hpp"
 #include "pade/navigation/navigator.hpp"
 #include "pade/navigation/plausibility.hpp"
 
@@ -57,7 +57,8 @@ struct CheckedLog {
 };
 /// Reads a log folder, puts jittering IMU stamps on a line (navigation::regularise_stamps) and checks the log
 /// (navigation::check_log). Errors: io::read_navigation_log.
-Result<CheckedLog> read_checked_log(const std::filesystem::path& folder, const io::NavigationLogOptions& options = {});
+Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
+                                    const io::NavigationLogOptions& options = {});
 
 /// The hints of a log and those of its run, worst first.
 std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run);

@@ -10,7 +10,7 @@
 #include "pade/depth/derotation.hpp"
 #include "pade/depth/pair_fusion.hpp"
 #include "pade/depth/prediction.hpp"
-#include "pade/flow/clg.hpp"
+#include "pade/flow/methods/clg.hpp"
 
 namespace pade {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pade/core/camera.hpp"
-#include "pade/io/run_info.hpp"
+#include "pade/io/run/run_info.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 

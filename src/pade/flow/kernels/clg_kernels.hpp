@@ -1,7 +1,7 @@
 // The steps of combined local-global flow on one pyramid level; the formulas are in clg_kernels.cpp.
 #pragma once
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 #include "pade/flow/kernels/plane_view.hpp"
 
 namespace pade::flow {

@@ -1,7 +1,7 @@
 // How sure a flow is, pixel by pixel; the formulas are in confidence_kernels.cpp.
 #pragma once
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 #include "pade/flow/kernels/plane_view.hpp"
 
 namespace pade::flow {

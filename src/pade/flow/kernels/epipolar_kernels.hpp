@@ -2,7 +2,7 @@
 // epipolar_kernels.cpp.
 #pragma once
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 #include "pade/flow/kernels/clg_kernels.hpp"
 #include "pade/flow/kernels/plane_view.hpp"
 

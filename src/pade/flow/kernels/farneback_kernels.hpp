@@ -1,7 +1,7 @@
 // Polynomial expansion and one displacement iteration of Farneback's method; formulas in the source file.
 #pragma once
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 #include "pade/flow/kernels/plane_view.hpp"
 
 namespace pade::flow {

@@ -1,7 +1,7 @@
 // One iteration of dense Lucas-Kanade on one pyramid level; the formulas are in lucas_kanade_kernels.cpp.
 #pragma once
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 #include "pade/flow/kernels/plane_view.hpp"
 
 namespace pade::flow {

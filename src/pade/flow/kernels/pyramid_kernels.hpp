@@ -2,7 +2,7 @@
 // formulas.
 #pragma once
 
-#include "pade/core/simd.hpp"
+#include "pade/core/compute/simd.hpp"
 #include "pade/flow/kernels/plane_view.hpp"
 
 namespace pade::flow {

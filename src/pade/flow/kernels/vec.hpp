@@ -1,7 +1,7 @@
 // What the flow kernels add to core/vec.hpp: fetches from planes, windows, convolutions.
 #pragma once
 
-#include "pade/core/vec.hpp"
+#include "pade/core/compute/vec.hpp"
 #include "pade/flow/kernels/plane_view.hpp"
 
 namespace pade::flow::PADE_ISA {

@@ -1,0 +1,251 @@
+#include "pade/io/formats/map_files.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <locale>
+#include <memory>
+#include <sstream>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pade/io/options_json.hpp"
+#include "pade/io/text.hpp"
+
+namespace pade::io {
+namespace {
+
+constexpr std::string_view kMagicBinary = "# Octomap OcTree binary file";
+constexpr std::string_view kMagicFull = "# Octomap OcTree file";
+
+struct Header {
+  MapFormat format = MapFormat::bt;
+  std::size_t nodes = 0;
+  double voxel = 0;
+  std::string_view data;
+};
+
+template <class Number>
+bool parse(std::string_view text, Number& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+std::string_view next_line(std::string_view& rest) {
+  const std::size_t end = rest.find('\n');
+  std::string_view line = rest.substr(0, end);
+  rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return line;
+}
+
+Result<Header> read_header(std::string_view content, std::string_view file) {
+  Header header;
+  std::string_view rest = content;
+  const std::string_view magic = next_line(rest);
+  if (magic.starts_with(kMagicBinary)) {
+    header.format = MapFormat::bt;
+  } else if (magic.starts_with(kMagicFull)) {
+    header.format = MapFormat::ot;
+  } else {
+    return Error{fmt::format("{}: not an OctoMap file; expected the first line '{}' or '{}'", file,
+                             kMagicBinary, kMagicFull)};
+  }
+  bool has_size = false;
+  for (int number = 2; !rest.empty(); ++number) {
+    const std::string_view line = next_line(rest);
+    if (line.empty() || line.front() == '#') continue;
+    if (line == "data") {
+      header.data = rest;
+      if (has_size && header.voxel > 0) return header;
+      return Error{fmt::format("{}: line {}: 'data' comes before 'size' and 'res'", file, number)};
+    }
+    const std::size_t blank = line.find(' ');
+    const std::string_view key = line.substr(0, blank);
+    const std::string_view value = blank == std::string_view::npos ? "" : line.substr(blank + 1);
+    if (key == "id" && value != "OcTree") {
+      return Error{fmt::format("{}: line {}: a tree of type '{}', expected OcTree", file, number, value)};
+    }
+    if (key == "size" && !(has_size = parse(value, header.nodes))) {
+      return Error{fmt::format("{}: line {}: size '{}', expected a number of nodes", file, number, value)};
+    }
+    if (key == "res" && !(parse(value, header.voxel) && header.voxel >= 0.001 && header.voxel <= 100)) {
+      return Error{fmt::format("{}: line {}: res '{}', expected 0.001 to 100 metres", file, number, value)};
+    }
+  }
+  return Error{fmt::format("{}: the header has no 'data' line", file)};
+}
+
+/// Walks the nodes of a file without building them. OctoMap's own reader trusts what it reads: at the end of
+/// a truncated file it goes on with whatever was in memory.
+class StructureCheck {
+ public:
+  explicit StructureCheck(const Header& header) : header_(header), rest_(header.data) {}
+
+  Status run(std::string_view file) {
+    const bool whole = header_.nodes == 0 || (header_.format == MapFormat::ot ? full(0) : binary(0));
+    if (whole && rest_.empty() && nodes_ == header_.nodes) return {};
+    return Error{fmt::format("{}: {} after {} of {} nodes", file, problem(whole), nodes_, header_.nodes)};
+  }
+
+ private:
+  [[nodiscard]] std::string_view problem(bool whole) const {
+    if (too_deep_) return "the tree is deeper than 16 levels";
+    if (not_finite_) return "a probability is not a finite number";
+    if (!whole) return "the file ends";
+    return rest_.empty() ? "the tree ends" : "the tree ends before the file";
+  }
+
+  std::uint8_t byte() {
+    const auto value = static_cast<std::uint8_t>(rest_.front());
+    rest_.remove_prefix(1);
+    return value;
+  }
+
+  /// A node of an .ot file: float log-odds, then one bit per child.
+  bool full(unsigned depth) {
+    if (rest_.size() < 5 || nodes_ >= header_.nodes) return false;
+    float log_odds = 0;
+    std::memcpy(&log_odds, rest_.data(), sizeof log_odds);
+    rest_.remove_prefix(sizeof log_odds);
+    not_finite_ = not_finite_ || !std::isfinite(log_odds);
+    const std::uint8_t children = byte();
+    ++nodes_;
+    if (not_finite_) return false;
+    if (children != 0 && depth == mapping::kTreeDepth) return !(too_deep_ = true);
+    for (unsigned i = 0; i < 8; ++i) {
+      if ((children >> i & 1U) != 0 && !full(depth + 1)) return false;
+    }
+    return true;
+  }
+
+  /// An inner node of a .bt file: two bits per child, 0 unknown, 1 free, 2 occupied, 3 inner.
+  bool binary(unsigned depth) {
+    if (rest_.size() < 2) return false;
+    unsigned children = byte();
+    children |= static_cast<unsigned>(byte()) << 8U;
+    ++nodes_;
+    if (children != 0 && depth == mapping::kTreeDepth) return !(too_deep_ = true);
+    for (unsigned i = 0; i < 8; ++i) {
+      const unsigned kind = children >> (2 * i) & 3U;
+      if (kind == 3 && !binary(depth + 1)) return false;
+      if (kind == 1 || kind == 2) ++nodes_;
+    }
+    return nodes_ <= header_.nodes;
+  }
+
+  const Header& header_;
+  std::string_view rest_;
+  std::size_t nodes_ = 0;
+  bool too_deep_ = false;
+  bool not_finite_ = false;
+};
+
+}  // namespace
+
+std::string encode_map(const mapping::OccupancyMap& map, MapFormat format) {
+  // The header is written here, since OctoMap's is in the locale of the stream and writes res with six
+  // digits.
+  octomap::OcTree tree(map.tree());
+  std::ostringstream data;
+  if (format == MapFormat::bt) {
+    tree.toMaxLikelihood();
+    tree.prune();
+    if (tree.size() > 0) tree.writeBinaryData(data);
+  } else if (tree.size() > 0) {
+    tree.writeData(data);
+  }
+  return fmt::format(
+             "{}\n# (feel free to add / change comments, but leave the first line as it is!)\n#\nid OcTree\n"
+             "size {}\nres {}\ndata\n",
+             format == MapFormat::bt ? kMagicBinary : kMagicFull, tree.size(), tree.getResolution()) +
+         data.str();
+}
+
+Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_view file,
+                                         const mapping::MapOptions& options) {
+  const auto header = read_header(content, file);
+  if (!header) return header.error();
+  if (const Status status = StructureCheck(*header).run(file); !status) return status.error();
+  auto tree = std::make_unique<octomap::OcTree>(header->voxel);
+  if (header->nodes > 0) {
+    std::istringstream data{std::string(header->data)};
+    if (header->format == MapFormat::bt) {
+      tree->readBinaryData(data);
+    } else {
+      tree->readData(data);
+    }
+    if (tree->size() != header->nodes) {
+      return Error{
+          fmt::format("{}: {} nodes could be built, expected {}", file, tree->size(), header->nodes)};
+    }
+  }
+  return mapping::OccupancyMap::create(options, std::move(tree));
+}
+
+Status write_map(const mapping::OccupancyMap& map, const std::filesystem::path& path, Overwrite overwrite) {
+  const std::string extension = path.extension().string();
+  if (extension != ".bt" && extension != ".ot") {
+    return Error{fmt::format("{}: the name of a map file must end in .bt or .ot", path.string())};
+  }
+  return write_file(path, encode_map(map, extension == ".bt" ? MapFormat::bt : MapFormat::ot), overwrite);
+}
+
+Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path,
+                                       const mapping::MapOptions& options) {
+  const auto content = read_file(path);
+  if (!content) return content.error();
+  return decode_map(*content, path.string(), options);
+}
+
+std::filesystem::path side_car_of(const std::filesystem::path& map_file) {
+  return std::filesystem::path(map_file).replace_extension(".json");
+}
+
+std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin,
+                            const Eigen::Vector3d& local_origin) {
+  nlohmann::ordered_json json;
+  json["options"] = nlohmann::ordered_json::parse(to_json(options));
+  if (origin) {
+    json["geographic_origin"] = {{"datum", "WGS-84"},
+                                 {"latitude_deg", origin->latitude_deg},
+                                 {"longitude_deg", origin->longitude_deg},
+                                 {"height_m", origin->height}};
+  } else {
+    json["geographic_origin"] = nullptr;
+  }
+  json["local_origin_m"] = {local_origin.x(), local_origin.y(), local_origin.z()};
+  return json.dump(2) + "\n";
+}
+
+Result<std::optional<GeographicOrigin>> decode_side_car(std::string_view content, std::string_view file) {
+  const auto json = nlohmann::json::parse(content, nullptr, false);
+  if (!json.is_object()) return Error{fmt::format("{}: not a JSON object", file)};
+  const auto found = json.find("geographic_origin");
+  if (found == json.end() || found->is_null()) return std::optional<GeographicOrigin>();
+  GeographicOrigin origin;
+  for (const auto& [name, value] :
+       {std::pair{"latitude_deg", &origin.latitude_deg}, std::pair{"longitude_deg", &origin.longitude_deg},
+        std::pair{"height_m", &origin.height}}) {
+    if (!found->is_object() || !found->contains(name) || !(*found)[name].is_number()) {
+      return Error{fmt::format("{}: geographic_origin has no number '{}'", file, name)};
+    }
+    *value = (*found)[name].get<double>();
+  }
+  return std::optional(origin);
+}
+
+Result<Eigen::Vector3d> decode_local_origin(std::string_view content, std::string_view file) {
+  const auto json = nlohmann::json::parse(content, nullptr, false);
+  if (!json.is_object()) return Error{fmt::format("{}: not a JSON object", file)};
+  const auto found = json.find("local_origin_m");
+  if (found == json.end()) return Eigen::Vector3d(Eigen::Vector3d::Zero());
+  const bool good = found->is_array() && found->size() == 3 && (*found)[0].is_number() &&
+                    (*found)[1].is_number() && (*found)[2].is_number();
+  if (!good) return Error{fmt::format("{}: local_origin_m: expected three numbers in metres", file)};
+  return Eigen::Vector3d((*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>());
+}
+
+}  // namespace pade::io

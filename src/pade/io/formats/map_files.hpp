@@ -1,0 +1,50 @@
+// OctoMap's files: `.bt` (free or occupied, small) and `.ot` (with probabilities), as octovis and other
+// programs read them, and the side-car beside them with what the format has no place for.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "pade/core/result.hpp"
+#include "pade/io/atomic_output.hpp"
+#include "pade/io/sequence/calibration.hpp"
+#include "pade/mapping/occupancy_map.hpp"
+
+namespace pade::io {
+
+enum class MapFormat {
+  bt,  ///< one of free, occupied, unknown per voxel
+  ot,  ///< log-odds per voxel
+};
+
+/// The content of a map file. Same map, same bytes.
+std::string encode_map(const mapping::OccupancyMap& map, MapFormat format);
+
+/// Reads the content of a map file of either format; `file` is the name in messages. The whole structure is
+/// checked before anything is built: a file that was cut short or is no octree gives an error, never a part
+/// of a map. The voxel size is the file's, all else is that of `options`.
+Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_view file,
+                                         const mapping::MapOptions& options = {});
+
+/// Writes `path`, which must end in .bt or .ot, whole or not at all; every byte is checked (a full disk is an
+/// error).
+Status write_map(const mapping::OccupancyMap& map, const std::filesystem::path& path, Overwrite overwrite);
+
+/// Reads a .bt or .ot file.
+Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path,
+                                       const mapping::MapOptions& options = {});
+
+/// The side-car of `map.bt` and `map.ot` is `map.json` beside them: options of the map and, where known,
+/// where on Earth the origin of its world lies.
+std::filesystem::path side_car_of(const std::filesystem::path& map_file);
+/// `local_origin` is RunInfo::local_origin: the point of the pose world that is 0 0 0 of the map.
+std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin,
+                            const Eigen::Vector3d& local_origin = Eigen::Vector3d::Zero());
+/// The geographic origin in a side-car; empty where it is not known there.
+Result<std::optional<GeographicOrigin>> decode_side_car(std::string_view content, std::string_view file);
+/// The local origin in a side-car; zero where it has none.
+Result<Eigen::Vector3d> decode_local_origin(std::string_view content, std::string_view file);
+
+}  // namespace pade::io

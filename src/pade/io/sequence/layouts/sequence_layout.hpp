@@ -1,0 +1,79 @@
+// What a folder layout (TUM RGB-D, EuRoC, KITTI odometry) delivers to Sequence: lists, not yet pixels.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pade/core/result.hpp"
+#include "pade/io/sequence/calibration.hpp"
+#include "pade/io/sequence/trajectory.hpp"
+#include "pade/io/skipped.hpp"
+
+namespace pade::io {
+
+struct StampedFile {
+  Time time;
+  std::filesystem::path file;
+};
+
+/// The lists of a sequence as found, in the order of the files.
+struct SequenceListing {
+  std::string layout;  ///< "TUM RGB-D", "EuRoC" or "KITTI odometry"
+  std::vector<StampedFile> images;
+  std::vector<StampedFile> depth;  ///< truth, may be empty
+  std::filesystem::path pose_file;
+  Trajectory trajectory;                  ///< T_world_camera or T_world_body
+  bool poses_of_body = false;             ///< T_body_camera of `calibration` is to be applied
+  bool computed = false;                  ///< the trajectory is of the camera, at the times of the images
+  std::map<Time, Matrix6d> covariances;   ///< of computed poses: Frame::motion_covariance
+  std::size_t motions_without_scale = 0;  ///< of computed poses
+  std::size_t frames_without_pose = 0;    ///< known when frames and poses have met
+  Calibration calibration;
+  std::optional<WorldUp> world_up;  ///< where the layout itself prescribes it
+};
+
+/// What a layout needs to know of the options.
+struct LayoutChoice {
+  std::string poses;                       ///< groundtruth, original or a file
+  std::filesystem::path calibration_file;  ///< empty = the layout's own
+  bool computed = false;                   ///< the poses come from elsewhere: none are read
+  int camera = 0;                          ///< of a calibration file that holds several
+};
+
+Result<SequenceListing> read_tum_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
+                                        ReadReport& report);
+Result<SequenceListing> read_euroc_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
+                                          ReadReport& report);
+Result<SequenceListing> read_kitti_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
+                                          ReadReport& report);
+
+/// Recognises the layout and reads it.
+Result<SequenceListing> read_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
+                                    ReadReport& report);
+
+/// Image files directly inside `folder`, sorted by name; empty where there is no such folder.
+std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder);
+
+/// `base`, the layout's own calibration, with what camera.yaml in `folder` and then the calibration file of
+/// the options say instead. That file must describe a camera: it was asked for.
+Result<Calibration> with_overrides(Calibration base, const std::filesystem::path& folder,
+                                   const LayoutChoice& choice, ReadReport& report);
+
+/// The parsers behind the layouts. Rows that cannot be used go to `report`; `file` is the name in messages.
+/// Lines of a time and a file name relative to the list, in columns `column` and `column` + 1.
+std::vector<StampedFile> parse_image_list(std::string_view text, const std::filesystem::path& file,
+                                          std::size_t column, ReadReport& report);
+std::vector<StampedFile> parse_euroc_images(std::string_view text, const std::filesystem::path& file,
+                                            ReadReport& report);
+Result<Trajectory> parse_euroc_poses(std::string_view text, const std::string& file, ReadReport& report);
+/// Row i is the pose at times[i].
+Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& file,
+                                     const std::vector<std::optional<Time>>& times, ReadReport& report);
+/// Row P<camera> of calib.txt; the body is camera 0, and the image size is not stated.
+Result<Calibration> parse_kitti_calibration(std::string_view text, const std::string& file, int camera);
+
+}  // namespace pade::io

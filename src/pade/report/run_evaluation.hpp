@@ -1,0 +1,21 @@
+// The accuracy of a run on disk.
+#pragma once
+
+#include <optional>
+
+#include "pade/core/result.hpp"
+#include "pade/evaluation/depth_accuracy.hpp"
+#include "pade/io/run/run_reader.hpp"
+#include "pade/io/sequence/sequence.hpp"
+
+namespace pade::evaluation {
+
+/// What evaluation.json of the run says; empty where there is none.
+Result<std::optional<DepthAccuracy>> stored_accuracy(const io::Run& run);
+
+/// Compares the depth stack of a run with the true depth of its sequence, with the run's own range limit.
+/// Equal to stored_accuracy() up to the half count that the 16-bit images round. Error where the run has no
+/// depth stack, where the sequence has no truth or images of another size, or where a file cannot be read.
+Result<DepthAccuracy> evaluate_stack(const io::Run& run, const io::Sequence& sequence);
+
+}  // namespace pade::evaluation

@@ -1,0 +1,374 @@
+#include "pade/simulation/flight/simulated_sequence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <future>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "pade/core/version.hpp"
+#include "pade/io/formats/flow_file.hpp"
+#include "pade/io/options_json.hpp"
+#include "pade/io/text.hpp"
+#include "pade/simulation/flight/sensor_files.hpp"
+#include "pade/simulation/render/truth.hpp"
+#include "pade/simulation/world/world_fingerprint.hpp"
+
+namespace pade::simulation {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string image_name(Time time) { return fmt::format("{}.png", to_string(time)); }
+
+std::string row(const Eigen::Vector3d& v) {
+  return fmt::format("{:.17g} {:.17g} {:.17g}", v.x(), v.y(), v.z());
+}
+
+/// Raised when the renderer gives other bytes for the same world, so that old frames are not mixed with new.
+constexpr int kRendererRevision = 2;
+
+/// Everything that decides the bytes of the sequence, as text.
+std::string record(const Scene& scene, const Flight& flight, const FlightCamera& camera,
+                   const SequenceOptions& options) {
+  const auto json = [](const auto& values) { return nlohmann::ordered_json::parse(io::to_json(values)); };
+  nlohmann::ordered_json points = nlohmann::ordered_json::array();
+  for (const Waypoint& w : flight.waypoints)
+    points.push_back(row(w.position) + fmt::format(" {:.17g} {:.17g}", w.yaw, w.time.value_or(-1)));
+  const TrajectoryOptions& t = flight.trajectory;
+  nlohmann::ordered_json swings = nlohmann::ordered_json::array();
+  for (const Oscillation* o : {&t.roll, &t.pitch, &t.yaw})
+    swings.push_back(fmt::format("{:.17g} {:.17g} {:.17g}", o->amplitude, o->period, o->phase));
+  const Camera& c = camera.camera;
+  const nlohmann::ordered_json all = {
+      {"made_by", fmt::format("pade {} simulate", version)},
+      {"renderer_revision", kRendererRevision},
+      {"world", {{"name", scene.world().name}, {"fingerprint", world_fingerprint(scene.world())}}},
+      {"flight",
+       {{"name", flight.name},
+        {"waypoints", points},
+        {"speed", t.speed},
+        {"heading", to_name(t.heading)},
+        {"start", to_name(t.start)},
+        {"end", to_name(t.end)},
+        {"drag", t.drag},
+        {"roll_pitch_yaw", swings},
+        {"frame_rate", flight.frame_rate},
+        {"first_frame_s", flight.first_frame},
+        {"frames", flight.frames},
+        {"exposure_time_s", flight.exposure_time},
+        {"blur_samples", flight.blur_samples}}},
+      {"camera",
+       {{"size", {c.width, c.height}},
+        {"intrinsics", {c.fx, c.fy, c.cx, c.cy}},
+        {"model", static_cast<int>(c.distortion)},
+        {"distortion", c.coefficients},
+        {"translation", row(camera.T_body_camera.translation)},
+        {"rotation", row(rotation_log(camera.T_body_camera.rotation))}}},
+      {"image", json(flight.image)},
+      {"sensors", json(flight.sensors)},
+      {"render", json(options.render)},
+      {"seed", options.seed},
+      {"every", options.every},
+      {"save_flow", options.save_flow}};
+  return all.dump(2) + "\n";
+}
+
+std::string camera_yaml(const FlightCamera& camera) {
+  const Camera& c = camera.camera;
+  constexpr std::array names = {"none", "plumb_bob", "rational_polynomial", "equidistant"};
+  constexpr std::array<std::size_t, 4> counts = {0, 5, 8, 4};
+  const auto model = static_cast<std::size_t>(c.distortion);
+  std::string coefficients;
+  for (std::size_t i = 0; i < counts[model]; ++i)
+    coefficients += fmt::format("{}{:.17g}", i > 0 ? ", " : "", c.coefficients[i]);
+  const Eigen::Matrix3d R = camera.T_body_camera.matrix3();
+  const Eigen::Vector3d& t = camera.T_body_camera.translation;
+  std::string mount;
+  for (int i = 0; i < 3; ++i)
+    mount += fmt::format("[{:.17g}, {:.17g}, {:.17g}, {:.17g}], ", R(i, 0), R(i, 1), R(i, 2), t[i]);
+  return fmt::format(
+      "# a simulated camera; depth_png / depth_scale = metres along the optical axis, exact, 0 = nothing "
+      "there\n"
+      "width: {}\nheight: {}\nfx: {:.17g}\nfy: {:.17g}\ncx: {:.17g}\ncy: {:.17g}\n"
+      "distortion_model: {}\ndistortion: [{}]\ndepth_scale: {}\n"
+      "pose_convention: camera_to_world_optical\nworld_up: \"+z\"\nT_body_camera: [{}[0, 0, 0, "
+      "1]]\ntime_offset_s: 0\n"
+      "geographic_origin: [{}]\n",
+      c.width, c.height, c.fx, c.fy, c.cx, c.cy, names[model], coefficients, simulated_depth_scale, mount,
+      geographic_origin_text);
+}
+
+std::string ground_truth(const std::vector<CameraStation>& stations) {
+  std::string text = "# timestamp tx ty tz qx qy qz qw: T_world_camera, world ENU, metres\n";
+  for (const CameraStation& s : stations) {
+    const Eigen::Vector3d& p = s.T_world_camera.translation;
+    const Eigen::Quaterniond& q = s.T_world_camera.rotation;
+    text += fmt::format("{} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", to_string(s.time), p.x(),
+                        p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  return text;
+}
+
+Result<std::string> png_bytes(const fs::path& file, const cv::Mat& image) {
+  std::vector<unsigned char> bytes;
+  // A fast setting: noise does not compress, whatever the effort.
+  if (!cv::imencode(
+          ".png", image, bytes,
+          {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE})) {
+    return Error{fmt::format("{}: cannot be encoded", file.string())};
+  }
+  return std::string(bytes.begin(), bytes.end());
+}
+
+Status write_png(const fs::path& file, const cv::Mat& image) {
+  const Result<std::string> bytes = png_bytes(file, image);
+  return bytes ? io::write_file(file, *bytes, io::Overwrite::replace) : Status(bytes.error());
+}
+
+cv::Mat depth_counts(const cv::Mat& depth) {
+  cv::Mat counts(depth.size(), CV_16UC1);
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u) {
+      const double scaled = std::round(static_cast<double>(depth.at<float>(v, u)) * simulated_depth_scale);
+      counts.at<std::uint16_t>(v, u) =
+          scaled >= 1 && scaled <= 65535 ? static_cast<std::uint16_t>(scaled) : std::uint16_t{0};
+    }
+  }
+  return counts;
+}
+
+/// The folder in which an unfinished sequence waits.
+fs::path partial_folder(const fs::path& out) {
+  return out.parent_path() / fmt::format(".{}.unfinished", out.filename().string());
+}
+
+/// Files that a killed run was just writing.
+void remove_fragments(const fs::path& folder) {
+  std::error_code ignored;
+  for (const auto& entry : fs::recursive_directory_iterator(folder, ignored)) {
+    if (entry.path().filename().string().starts_with(".")) fs::remove(entry.path(), ignored);
+  }
+}
+
+/// Makes or takes up the work folder of a sequence.
+Status prepare(const fs::path& work, const std::string& text, const SequenceOptions& options) {
+  std::error_code failed;
+  const auto found = io::read_file(work / simulation_record);
+  if (found && *found == text) {
+    remove_fragments(work);
+  } else {
+    fs::remove_all(work, failed);
+  }
+  std::vector<std::string> folders = {"rgb", "depth"};
+  if (options.save_flow)
+    folders.insert(folders.end(), {"flow_next", "flow_previous", "visible_next", "visible_previous"});
+  for (const std::string& folder : folders) {
+    fs::create_directories(work / folder, failed);
+    if (failed)
+      return Error{fmt::format("{}: cannot be made: {}", (work / folder).string(), failed.message())};
+  }
+  return io::write_file(work / simulation_record, text, io::Overwrite::replace);
+}
+
+/// One flight while it is rendered.
+class Recorder {
+ public:
+  Recorder(const Scene& scene, const Flight& flight, const Trajectory& path, const FlightCamera& camera,
+           const SequenceOptions& options, std::vector<CameraStation> stations, fs::path work)
+      : scene_(scene),
+        flight_(flight),
+        path_(path),
+        camera_(camera),
+        options_(options),
+        stations_(std::move(stations)),
+        work_(std::move(work)),
+        grid_(camera.camera),
+        renderer_(scene) {}
+
+  Status record(const FrameProgress& progress) const;
+
+ private:
+  [[nodiscard]] Status frame(std::size_t index) const;
+  [[nodiscard]] Status flow(std::size_t index, const cv::Mat& depth) const;
+  [[nodiscard]] Rendering exposed(std::size_t index) const;
+
+  const Scene& scene_;
+  const Flight& flight_;
+  const Trajectory& path_;
+  const FlightCamera& camera_;
+  const SequenceOptions& options_;
+  std::vector<CameraStation> stations_;
+  fs::path work_;
+  RayGrid grid_;
+  Renderer renderer_;
+};
+
+Status Recorder::record(const FrameProgress& progress) const {
+  const int total = static_cast<int>(stations_.size());
+  for (int i = 0; i < total; ++i) {
+    if (io::interrupted()) return io::interrupted_and_kept_error();
+    // The image is written last: where it is, the frame is finished.
+    const std::string name = image_name(stations_[static_cast<std::size_t>(i)].time);
+    if (!io::path_exists(work_ / "rgb" / name)) {
+      if (const Status status = frame(static_cast<std::size_t>(i)); !status) return status;
+    }
+    if (progress) progress(i + 1, total);
+  }
+  return {};
+}
+
+Rendering Recorder::exposed(std::size_t index) const {
+  const CameraStation& station = stations_[index];
+  if (flight_.exposure_time <= 0)
+    return renderer_.render(grid_, station.T_world_camera, options_.render, options_.threads);
+  Rendering blurred;
+  blurred.depth = exact_depth(scene_, grid_, station.T_world_camera, options_.threads);
+  for (int k = 0; k < flight_.blur_samples; ++k) {
+    const double offset = flight_.exposure_time * ((k + 0.5) / flight_.blur_samples - 0.5);
+    const Pose pose = camera_pose_at(path_, station.time.seconds() + offset, camera_.T_body_camera);
+    const Rendering part = renderer_.render(grid_, pose, options_.render, options_.threads);
+    if (k == 0) {
+      blurred.radiance = part.radiance;
+    } else {
+      blurred.radiance += part.radiance;
+    }
+  }
+  blurred.radiance /= flight_.blur_samples;
+  return blurred;
+}
+
+Status Recorder::frame(std::size_t index) const {
+  const CameraStation& station = stations_[index];
+  const std::string name = image_name(station.time);
+  const Rendering rendering = exposed(index);
+  const auto write_depth = [&] { return write_png(work_ / "depth" / name, depth_counts(rendering.depth)); };
+  std::future<Status> depth_written =
+      std::async(options_.threads > 1 ? std::launch::async : std::launch::deferred, write_depth);
+  if (options_.save_flow) {
+    if (const Status s = flow(index, rendering.depth); !s) return s;
+  }
+  // The stamp, not the index, seeds the noise: leaving frames out does not change the others.
+  const cv::Mat image =
+      form_image(rendering.radiance, grid_, flight_.image, station.time.seconds(), options_.seed,
+                 static_cast<std::uint64_t>(station.time.nanoseconds), options_.threads);
+  const Result<std::string> encoded = png_bytes(work_ / "rgb" / name, image);
+  if (const Status s = depth_written.get(); !s) return s;
+  if (!encoded) return encoded.error();
+  return io::write_file(work_ / "rgb" / name, *encoded, io::Overwrite::replace);
+}
+
+Status Recorder::flow(std::size_t index, const cv::Mat& depth) const {
+  const auto toward = [&](std::size_t other, const std::string& which) -> Status {
+    const ExactFlow exact = exact_flow(scene_, grid_, depth, stations_[index].T_world_camera,
+                                       stations_[other].T_world_camera, options_.threads);
+    const std::string name = to_string(stations_[index].time);
+    if (const Status s = io::write_flow(work_ / fmt::format("flow_{}/{}.flo", which, name), exact.flow); !s)
+      return s;
+    return write_png(work_ / fmt::format("visible_{}/{}.png", which, name), exact.visible);
+  };
+  if (index + 1 < stations_.size()) {
+    if (const Status s = toward(index + 1, "next"); !s) return s;
+  }
+  return index > 0 ? toward(index - 1, "previous") : Status();
+}
+
+Status check_free(const Scene& scene, const std::vector<CameraStation>& stations) {
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    const Eigen::Vector3d& p = stations[i].T_world_camera.translation;
+    if (const auto solid = scene.inside_of(p)) {
+      return Error{fmt::format(
+          "frame {} at {} s: found the camera at ({:.2f}, {:.2f}, {:.2f}) inside '{}', expected free space",
+          i + 1, to_string(stations[i].time), p.x(), p.y(), p.z(), *solid)};
+    }
+  }
+  return {};
+}
+
+Status check_target(const fs::path& out, io::Overwrite overwrite) {
+  std::error_code failed;
+  if (!io::path_exists(out)) {
+    if (!out.parent_path().empty()) fs::create_directories(out.parent_path(), failed);
+    if (failed)
+      return Error{fmt::format("{}: cannot be made: {}", out.parent_path().string(), failed.message())};
+    return {};
+  }
+  if (overwrite == io::Overwrite::refuse) {
+    return Error{fmt::format("{}: exists already, expected a new folder (or --force)", out.string())};
+  }
+  const bool ours = fs::is_directory(out, failed) &&
+                    (fs::is_empty(out, failed) || io::path_exists(out / simulation_record));
+  if (!ours) return Error{fmt::format("{}: is no simulated sequence and is not replaced", out.string())};
+  return {};
+}
+
+}  // namespace
+
+FlightCamera flight_camera(const Flight& flight, const World& world) {
+  FlightCamera out;
+  out.T_body_camera.rotation = Eigen::Quaterniond(forward_camera_rotation());
+  out.camera.width = 640;
+  out.camera.height = 480;
+  out.camera.fx = out.camera.fy = 554.26;
+  out.camera.cx = 319.5;
+  out.camera.cy = 239.5;
+  if (!world.cameras.empty()) {
+    out.camera = world.cameras.front().camera;
+    out.T_body_camera = world.cameras.front().T_body_camera;
+  }
+  if (flight.camera) out.camera = *flight.camera;
+  if (flight.T_body_camera) out.T_body_camera = *flight.T_body_camera;
+  return out;
+}
+
+Status write_sequence(const Scene& scene, const Flight& flight, const fs::path& target,
+                      const SequenceOptions& options, const FrameProgress& progress) {
+  std::error_code failed;
+  const fs::path out = fs::absolute(target.filename().empty() ? target.parent_path() : target, failed);
+  const auto path = Trajectory::through(flight.waypoints, flight.trajectory);
+  if (!path) return Error{fmt::format("flight '{}': {}", flight.name, path.error().message)};
+  const FlightCamera camera = flight_camera(flight, scene.world());
+  auto stations = camera_stations(flight, *path, camera.T_body_camera);
+  if (!stations) return stations.error();
+  if (const Status s = check_free(scene, *stations); !s) return s;
+  std::vector<CameraStation> chosen;
+  for (std::size_t i = 0; i < stations->size(); i += static_cast<std::size_t>(std::max(options.every, 1)))
+    chosen.push_back((*stations)[i]);
+
+  const std::string made_of = record(scene, flight, camera, options);
+  if (options.keep_finished) {
+    const auto found = io::read_file(out / simulation_record);
+    if (found && *found == made_of) return {};
+    if (found && options.overwrite == io::Overwrite::refuse) {
+      return Error{fmt::format(
+          "{}: found a sequence of another world, flight, option or version of the program, expected the one "
+          "of this command or none (pade simulate --force replaces it)",
+          out.string())};
+    }
+  }
+  if (const Status s = check_target(out, options.overwrite); !s) return s;
+  const fs::path work = partial_folder(out);
+  if (const Status s = prepare(work, made_of, options); !s) return s;
+  const auto write = [&](const char* name, const std::string& text) {
+    return io::write_file(work / name, text, io::Overwrite::replace);
+  };
+  if (const Status s = write("camera.yaml", camera_yaml(camera)); !s) return s;
+  if (const Status s = write("groundtruth.txt", ground_truth(chosen)); !s) return s;
+  if (flight.sensors.enabled) {
+    for (const auto& [name, text] : sensor_files(*path, flight.sensors, options.seed)) {
+      if (const Status s = write(name.c_str(), text); !s) return s;
+    }
+  }
+  const Recorder recorder(scene, flight, *path, camera, options, std::move(chosen), work);
+  if (const Status s = recorder.record(progress); !s) return s;
+  if (options.overwrite == io::Overwrite::replace) fs::remove_all(out, failed);
+  fs::rename(work, out, failed);
+  if (failed) return Error{fmt::format("{}: cannot be put in place: {}", out.string(), failed.message())};
+  return {};
+}
+
+}  // namespace pade::simulation

@@ -1,0 +1,164 @@
+#include "pade/io/formats/map_files.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <octomap/OcTree.h>
+
+#include "mapping/flown_map.hpp"
+
+namespace pade::io {
+namespace {
+
+using mapping::map_of;
+using mapping::MapCell;
+using mapping::MapOptions;
+using mapping::Occupancy;
+using mapping::OccupancyMap;
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+
+const OccupancyMap& flown() {
+  static const OccupancyMap map =
+      map_of(*simulation::make_analytic_flight("forward", 3, simulation::analytic_camera(160, 120)), 0.01);
+  return map;
+}
+
+class MapFile : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("pade_map_files_" + std::to_string(std::random_device{}()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  [[nodiscard]] bool is_binary() const { return std::string(GetParam()) == "bt"; }
+  [[nodiscard]] MapFormat format() const { return is_binary() ? MapFormat::bt : MapFormat::ot; }
+
+  fs::path folder_;
+};
+
+/// Every leaf of the map has the same state in `tree`, and the other way round.
+void expect_same_space(const OccupancyMap& map, const octomap::OcTree& tree) {
+  std::size_t checked = 0;
+  map.for_each([&](const MapCell& cell, Occupancy state) {
+    const octomap::OcTreeNode* node = tree.search(cell.key);
+    ASSERT_NE(node, nullptr);
+    ASSERT_EQ(tree.isNodeOccupied(node), state == Occupancy::occupied);
+    ++checked;
+  });
+  EXPECT_GT(checked, 1000U);
+  for (auto leaf = tree.begin_leafs(); leaf != tree.end_leafs(); ++leaf) {
+    const Vector3d centre(leaf.getX(), leaf.getY(), leaf.getZ());
+    ASSERT_EQ(map.at(centre - Vector3d::Constant(0.01)),
+              tree.isNodeOccupied(*leaf) ? Occupancy::occupied : Occupancy::free);
+  }
+}
+
+TEST_P(MapFile, IsReadByOctoMapItself) {
+  const fs::path path = folder_ / (std::string("map.") + GetParam());
+  ASSERT_TRUE(write_map(flown(), path, io::Overwrite::refuse).ok());
+  std::unique_ptr<octomap::OcTree> tree;
+  if (is_binary()) {
+    tree = std::make_unique<octomap::OcTree>(0.5);
+    ASSERT_TRUE(tree->readBinary(path.string()));
+  } else {
+    tree.reset(dynamic_cast<octomap::OcTree*>(octomap::AbstractOcTree::read(path.string())));
+    ASSERT_TRUE(tree);
+  }
+  EXPECT_DOUBLE_EQ(tree->getResolution(), 0.1);
+  expect_same_space(flown(), *tree);
+}
+
+TEST_P(MapFile, IsReadByTheToolsOfOctoMap) {
+  if (std::system("command -v bt2vrml > /dev/null 2>&1") != 0)
+    GTEST_SKIP() << "octomap-tools is not installed";
+  const fs::path path = folder_ / (std::string("map.") + GetParam());
+  ASSERT_TRUE(write_map(flown(), path, io::Overwrite::refuse).ok());
+  const std::string tool = is_binary()
+                               ? "bt2vrml " + path.string()
+                               : "convert_octree " + path.string() + " " + (folder_ / "out.bt").string();
+  ASSERT_EQ(std::system((tool + " > /dev/null 2>&1").c_str()), 0);
+  const fs::path made = folder_ / (is_binary() ? "map.bt.wrl" : "out.bt");
+  ASSERT_TRUE(fs::exists(made));
+  EXPECT_GT(fs::file_size(made), 2000U);
+}
+
+TEST_P(MapFile, ReadsBackToTheSameSpaceAndTheSameBytes) {
+  const std::string content = encode_map(flown(), format());
+  const auto map = decode_map(content, "map");
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  expect_same_space(flown(), map->tree());
+  EXPECT_EQ(encode_map(*map, format()), content);
+}
+
+TEST_P(MapFile, OfAnEmptyMapReadsBackEmpty) {
+  const OccupancyMap empty = std::move(OccupancyMap::create()).value();
+  const auto map = decode_map(encode_map(empty, format()), "map");
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->counts().free + map->counts().occupied, 0U);
+}
+
+TEST_P(MapFile, CutShortAnywhereIsAnErrorAndNeverPartOfAMap) {
+  const std::string content = encode_map(flown(), format());
+  std::mt19937 random(1);
+  std::uniform_int_distribution<std::size_t> where(0, content.size() - 1);
+  for (int i = 0; i < 300; ++i) {
+    const auto map =
+        decode_map(content.substr(0, i < 150 ? static_cast<std::size_t>(i) : where(random)), "map");
+    ASSERT_FALSE(map.ok());
+    EXPECT_EQ(map.error().message.rfind("map: ", 0), 0U) << map.error().message;
+  }
+  EXPECT_FALSE(decode_map(content + "x", "map").ok());
+}
+
+TEST_P(MapFile, WithChangedBytesIsAnErrorOrAMapButNeverACrash) {
+  const std::string content = encode_map(flown(), format());
+  std::mt19937 random(2);
+  std::uniform_int_distribution<std::size_t> where(0, content.size() - 1);
+  std::uniform_int_distribution<int> byte(0, 255);
+  for (int i = 0; i < 60; ++i) {
+    std::string changed = content;
+    changed[where(random)] = static_cast<char>(byte(random));
+    const auto map = decode_map(changed, "map");
+    if (map.ok()) {
+      EXPECT_GT(map->counts().free, 0U);
+    }
+  }
+}
+
+TEST_P(MapFile, ThatCannotBeWrittenIsAnError) {
+  const std::string name = std::string("map.") + GetParam();
+  const Status nowhere = write_map(flown(), folder_ / "missing" / name, io::Overwrite::refuse);
+  ASSERT_FALSE(nowhere.ok());
+  EXPECT_NE(nowhere.error().message.find(name), std::string::npos);
+  ASSERT_TRUE(write_map(flown(), folder_ / name, io::Overwrite::refuse).ok());
+  EXPECT_FALSE(write_map(flown(), folder_ / name, io::Overwrite::refuse).ok());
+  EXPECT_TRUE(write_map(flown(), folder_ / name, io::Overwrite::replace).ok());
+  EXPECT_FALSE(write_map(flown(), folder_ / "map.txt", io::Overwrite::refuse).ok());
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, MapFile, testing::Values("bt", "ot"),
+                         [](const auto& format) { return std::string(format.param); });
+
+TEST(SideCar, CarriesTheGeographicOriginWhereItIsKnown) {
+  const io::GeographicOrigin origin{47.397742, 8.545594, 488.25};
+  const auto with = decode_side_car(encode_side_car({}, origin), "map.json");
+  ASSERT_TRUE(with.ok()) << with.error().message;
+  EXPECT_EQ(**with, origin);
+  const auto without = decode_side_car(encode_side_car({}, std::nullopt), "map.json");
+  ASSERT_TRUE(without.ok());
+  EXPECT_FALSE(without->has_value());
+  EXPECT_FALSE(decode_side_car("nonsense", "map.json").ok());
+  EXPECT_FALSE(decode_side_car(R"({"geographic_origin": {"latitude_deg": 1}})", "map.json").ok());
+  EXPECT_EQ(side_car_of("run/map.bt"), fs::path("run/map.json"));
+}
+
+}  // namespace
+}  // namespace pade::io

@@ -1,0 +1,228 @@
+#include "pade/simulation/sdf/sdf_reader.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+namespace pade::simulation {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+/// A folder of a test's own, removed at its end.
+class SdfReader : public testing::Test {
+ protected:
+  SdfReader()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("pade_sdf_" + std::to_string(::getpid()) + "_" +
+                 testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    std::filesystem::create_directories(folder_);
+  }
+  ~SdfReader() override { std::filesystem::remove_all(folder_); }
+  SdfReader(const SdfReader&) = delete;
+  SdfReader& operator=(const SdfReader&) = delete;
+
+  std::filesystem::path write(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  std::filesystem::path world(const std::string& body, const std::string& version = "1.9") const {
+    return write("a.sdf", "<?xml version=\"1.0\"?>\n<sdf version=\"" + version +
+                              "\" xmlns:pade=\"https://pade/sdf\">\n<world name=\"w\">\n" + body +
+                              "\n</world>\n</sdf>\n");
+  }
+  static std::string model(const std::string& visual, const std::string& pose = "0 0 0 0 0 0") {
+    return "<model name=\"m\"><static>true</static><pose>" + pose +
+           "</pose><link name=\"l\"><visual name=\"v\">" + visual + "</visual></link></model>";
+  }
+  static std::string message(const Result<World>& result) {
+    return result.ok() ? "accepted" : result.error().message;
+  }
+
+  std::filesystem::path folder_;
+};
+
+constexpr auto kBox = "<geometry><box><size>1 2 3</size></box></geometry>";
+
+TEST_F(SdfReader, PosesAddUpFromModelToVisual) {
+  const auto result = read_sdf(world(
+      "<model name='m'><pose>1 2 3 0 0 1.5707963267948966</pose><link name='l'><pose>1 0 0 0 0 0</pose>"
+      "<visual name='v'><pose>0 1 0 0 0 0</pose><geometry><sphere><radius>2</radius></sphere></geometry>"
+      "</visual></link></model>"));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_EQ(result->visuals.size(), 1U);
+  EXPECT_LT((result->visuals[0].T_world_shape.translation - Eigen::Vector3d(0, 3, 3)).norm(), 1e-9);
+  EXPECT_EQ(std::get<Ellipsoid>(result->visuals[0].shape).radii.x(), 2);
+}
+
+TEST_F(SdfReader, ReadsSunSceneMaterialAndPattern) {
+  const auto result = read_sdf(world(
+      "<light type='directional' name='sun'><direction>1 0 -1</direction><diffuse>1 1 1 1</diffuse></light>"
+      "<scene><ambient>0.5 0.5 0.5 1</ambient><background>0 0 1 1</background></scene>" +
+      model(std::string(kBox) + "<material><diffuse>1 0 0 1</diffuse><pade:pattern scale='2' "
+                                "contrast='0.5'>brick</pade:pattern></material>")));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_TRUE(result->sun.has_value());
+  EXPECT_EQ(result->sun->direction, Eigen::Vector3d(1, 0, -1));
+  EXPECT_LT((result->visuals[0].material.colour - Eigen::Vector3d(1, 0, 0)).norm(), 1e-9);
+  EXPECT_EQ(result->visuals[0].material.pattern, (Pattern{PatternKind::brick, 2, 0.5}));
+  EXPECT_THAT(result->warnings, testing::IsEmpty());
+}
+
+TEST_F(SdfReader, ReadsACameraAsItIsMounted) {
+  const auto result =
+      read_sdf(world(model(kBox) + "<model name='q'><link name='l'><sensor name='c' type='camera'><pose>0.1 "
+                                   "0 0.05 0 0 0</pose><update_rate>20</update_rate>"
+                                   "<camera><horizontal_fov>1.0471975512</horizontal_fov><image><width>640</"
+                                   "width><height>480</height><format>L8</format>"
+                                   "</image></camera></sensor></link></model>"));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_EQ(result->cameras.size(), 1U);
+  const CameraSensor& camera = result->cameras[0];
+  EXPECT_NEAR(camera.camera.fx, 554.256, 1e-3);
+  EXPECT_FALSE(camera.colour);
+  EXPECT_EQ(camera.rate, 20);
+  EXPECT_LT((camera.T_body_camera.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(),
+            1e-12);
+  EXPECT_LT((camera.T_body_camera.translation - Eigen::Vector3d(0.1, 0, 0.05)).norm(), 1e-12);
+}
+
+TEST_F(SdfReader, FindsIncludedModelsMeshesAndImages) {
+  write("models/tower/model.config", "<model><sdf version='1.9'>tower.sdf</sdf></model>");
+  write("models/tower/tower.sdf",
+        "<sdf version='1.9'><model name='tower'><link name='l'><visual "
+        "name='v'><geometry><mesh><uri>meshes/t.obj</uri>"
+        "<scale>2 2 "
+        "2</scale></mesh></geometry><material><pbr><metal><albedo_map>t.png</albedo_map></metal></pbr></"
+        "material>"
+        "</visual></link></model></sdf>");
+  write("models/tower/meshes/t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+  cv::imwrite((folder_ / "models/tower/t.png").string(), cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 20, 30)));
+  const auto result = read_sdf(world("<include><uri>model://tower</uri><pose>5 0 0 0 0 0</pose></include>"));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_EQ(result->visuals.size(), 1U);
+  const auto& mesh = std::get<Mesh>(result->visuals[0].shape);
+  EXPECT_EQ(mesh.triangles->triangles.size(), 1U);
+  EXPECT_EQ(mesh.scale.x(), 2);
+  EXPECT_TRUE(result->visuals[0].material.image);
+  EXPECT_EQ(result->visuals[0].T_world_shape.translation.x(), 5);
+}
+
+TEST_F(SdfReader, NamesWhatItLeavesOut) {
+  const auto result =
+      read_sdf(world("<light type='point' name='lamp'/><plugin name='p' filename='f'/>" +
+                     model(std::string(kBox) + "<wobble>3</wobble><material><script><uri>file://x.material</"
+                                               "uri><name>Gazebo/Grey</name></script></material>")));
+  ASSERT_TRUE(result.ok()) << message(result);
+  EXPECT_THAT(result->warnings, Contains(HasSubstr("<wobble> in <visual>")));
+  EXPECT_THAT(result->warnings, Contains(HasSubstr("<plugin>")));
+  EXPECT_THAT(result->warnings, Contains(HasSubstr("<script>")));
+  EXPECT_THAT(result->warnings, Contains(HasSubstr("'lamp'")));
+}
+
+TEST_F(SdfReader, RefusesAnUnknownPartOfAMeshByName) {
+  write("t.obj", "o left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_THAT(
+      message(read_sdf(world(model(
+          "<geometry><mesh><uri>t.obj</uri><submesh><name>middle</name></submesh></mesh></geometry>")))),
+      testing::AllOf(HasSubstr("a.sdf:"), HasSubstr("found no part 'middle'"), HasSubstr("left")));
+}
+
+TEST_F(SdfReader, ChainsSensorPosesThroughNestedModels) {
+  const auto result = read_sdf(world(
+      "<model name='q'><pose>5 5 5 0 0 1</pose><link name='l'/><model name='gimbal'><pose>0.1 0 0 0 0 "
+      "0</pose><link "
+      "name='l'><pose>0 0.2 0 0 0 0</pose><sensor name='c' type='camera'><pose>0 0 0.3 0 0 0</pose><camera>"
+      "<horizontal_fov>1</horizontal_fov><image><width>640</width><height>480</height></image></camera></"
+      "sensor></link>"
+      "</model></model>" +
+      model(kBox)));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_EQ(result->cameras.size(), 1U);
+  EXPECT_LT((result->cameras[0].T_body_camera.translation - Eigen::Vector3d(0.1, 0.2, 0.3)).norm(), 1e-12);
+}
+
+TEST_F(SdfReader, LeavesNothingOnTheErrorStream) {
+  write("models/a/model.sdf",
+        "<sdf version='1.9'><model name='a'><include><uri>model://ghost</uri></include></model></sdf>");
+  testing::internal::CaptureStderr();
+  EXPECT_FALSE(read_sdf(world("<include><uri>model://a</uri></include>")).ok());
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST_F(SdfReader, RefusesNewerVersions) {
+  for (const char* version : {"1.10", "1.11", "2.0", "x"}) {
+    EXPECT_THAT(message(read_sdf(world(model(kBox), version))),
+                testing::AllOf(HasSubstr("a.sdf:2"), HasSubstr(version), HasSubstr("expected 1.0 to 1.9")));
+  }
+}
+
+TEST_F(SdfReader, RefusesWhatIsMissing) {
+  EXPECT_THAT(message(read_sdf(folder_ / "nothing.sdf")), HasSubstr("no such world"));
+  EXPECT_THAT(message(read_sdf(world(model("<geometry><mesh><uri>model://x/y.obj</uri></mesh></geometry>")))),
+              HasSubstr("y.obj"));
+  EXPECT_THAT(message(read_sdf(world(model(std::string(kBox) +
+                                           "<material><pbr><metal><albedo_map>no.png</albedo_map></metal>"
+                                           "</pbr></material>")))),
+              HasSubstr("no.png"));
+  EXPECT_THAT(message(read_sdf(world("<include><uri>model://ghost</uri></include>"))), HasSubstr("ghost"));
+  write("broken.obj", "not a mesh");
+  EXPECT_THAT(message(read_sdf(world(model("<geometry><mesh><uri>broken.obj</uri></mesh></geometry>")))),
+              HasSubstr("broken.obj"));
+  write("broken.png", "not an image");
+  EXPECT_THAT(message(read_sdf(world(model(
+                  std::string(kBox) +
+                  "<material><pbr><metal><albedo_map>broken.png</albedo_map></metal></pbr></material>")))),
+              HasSubstr("broken.png"));
+}
+
+TEST_F(SdfReader, RefusalsSayWhere) {
+  for (const char* visual :
+       {"<geometry><mesh><uri>no.obj</uri></mesh></geometry>",
+        "<geometry><box><size>1 1 "
+        "1</size></box></geometry><material><pbr><metal><albedo_map>no.png</albedo_map>"
+        "</metal></pbr></material>",
+        "<geometry><cilinder><radius>1</radius></cilinder></geometry>",
+        "<geometry><sphere><radius>0,4</radius></sphere></geometry>",
+        "<geometry><box><size>1 1 "
+        "1</size></box></geometry><material><pade:pattern>marble</pade:pattern></material>"}) {
+    EXPECT_THAT(message(read_sdf(world(model(visual)))), testing::ContainsRegex("a\\.sdf:[1-9][0-9]*: "))
+        << visual;
+  }
+}
+
+TEST_F(SdfReader, RefusesAnIncludeOfItself) {
+  write("models/a/model.sdf",
+        "<sdf version='1.9'><model name='a'><include><uri>model://b</uri></include></model></sdf>");
+  write("models/b/model.sdf",
+        "<sdf version='1.9'><model name='b'><include><uri>model://a</uri></include></model></sdf>");
+  EXPECT_THAT(message(read_sdf(world("<include><uri>model://a</uri></include>"))), HasSubstr("cycle"));
+}
+
+TEST_F(SdfReader, RefusesBadNumbersAndPatterns) {
+  EXPECT_THAT(message(read_sdf(world(model("<geometry><box><size>1 two 3</size></box></geometry>")))),
+              HasSubstr("1 two 3"));
+  EXPECT_THAT(message(read_sdf(world(model(kBox, "0 0 zero 0 0 0")))), HasSubstr("zero"));
+  EXPECT_THAT(message(read_sdf(world(
+                  model(std::string(kBox) + "<material><pade:pattern>marble</pade:pattern></material>")))),
+              testing::AllOf(HasSubstr("marble"), HasSubstr("brick")));
+  EXPECT_THAT(
+      message(read_sdf(world(
+          model(std::string(kBox) + "<material><pade:pattern scale='big'>brick</pade:pattern></material>")))),
+      HasSubstr("scale=\"big\""));
+  // libsdformat alone would read the 0 before the comma.
+  EXPECT_THAT(message(read_sdf(world(model("<geometry><sphere><radius>0,4</radius></sphere></geometry>")))),
+              HasSubstr("field <radius>: found '0,4'"));
+  EXPECT_THAT(message(read_sdf(world(model("<geometry><box><size>1 2,5 3</size></box></geometry>")))),
+              HasSubstr("2,5"));
+  EXPECT_THAT(message(read_sdf(write("b.sdf", "<sdf version='1.9'><world"))), HasSubstr("b.sdf"));
+}
+
+}  // namespace
+}  // namespace pade::simulation
