@@ -56,7 +56,10 @@ double share_of(const RunInfo& info, DepthState state) {
 }
 
 std::string baseline_text(const RunInfo& info) {
-  return fmt::format("it moves {:.3g} cm between the frames of a pair (median)", 100 * info.motion.baseline);
+  const double baseline = info.motion.baseline;
+  return baseline < 1
+             ? fmt::format("it moves {:.3g} cm between the frames of a pair (median)", 100 * baseline)
+             : fmt::format("it moves {:.3g} m between the frames of a pair (median)", baseline);
 }
 
 /// Depth beyond the range nearly everywhere: the scene is far, or the poses move far too much.

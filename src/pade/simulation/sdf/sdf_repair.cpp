@@ -56,9 +56,7 @@ class Repair {
         continue;
       }
       if (has_name(kind) && child->HasAttribute("name")) tell_apart(child, names[kind]);
-      if (kind == "script" && !child->HasElement("uri")) {
-        child->GetElement("uri")->Set(std::string("file://media/materials/scripts/gazebo.material"));
-      }
+      if (kind == "script") give_uri(child);
       walk(child);
     }
   }
@@ -66,6 +64,15 @@ class Repair {
   std::vector<std::string> warnings;
 
  private:
+  /// The name of a material is enough; the parser puts "__default__" where a file says nothing.
+  static void give_uri(const sdf::ElementPtr& script) {
+    const auto uri = script->GetElement("uri");
+    const auto text = uri->Get<std::string>();
+    if (text.empty() || text == "__default__") {
+      uri->Set(std::string("file://media/materials/scripts/gazebo.material"));
+    }
+  }
+
   void tell_apart(const sdf::ElementPtr& element, std::set<std::string>& taken) {
     const auto name = element->Get<std::string>("name");
     if (taken.insert(name).second) return;
