@@ -141,7 +141,9 @@ TEST(StampsOfTheImu, ArePutOnALineWhereTheyRepeat) {
   EXPECT_EQ(hint->id, "imu-stamps-regularised");
   for (std::size_t i = 0; i < jittered.size(); ++i) {
     EXPECT_NEAR(seconds_between(log.imu[i].time, jittered[i].time), -0.005, 0.0051);
-    if (i > 0) EXPECT_GT(jittered[i].time, jittered[i - 1].time);
+    if (i > 0) {
+      EXPECT_GT(jittered[i].time, jittered[i - 1].time);
+    }
   }
 }
 
@@ -192,7 +194,9 @@ TEST(RunCheck, HasNothingToSayOfAGoodRun) {
   EXPECT_THAT(check_run(sensors, health, log.imu.size()), IsEmpty());
   ASSERT_THAT(sensors, Contains(Field(&SensorSummary::sensor, "gnss_velocity")));
   for (const SensorSummary& sensor : sensors) {
-    if (sensor.sensor == "gnss_velocity") EXPECT_NEAR(sensor.chi_square, 1, 0.5);
+    if (sensor.sensor == "gnss_velocity") {
+      EXPECT_NEAR(sensor.chi_square, 1, 0.5);
+    }
   }
 }
 

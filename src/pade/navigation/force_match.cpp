@@ -15,7 +15,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kGravity = 9.80665;  // m/s²
-constexpr double kLongest = 300;      // s of the log that are looked at
+constexpr double kLongest = 120;      // s of the log that are looked at
 constexpr double kWindow = 5;         // s: drift of a gyroscope of 0.05 rad/s turns by a few degrees
 constexpr double kInterval = 0.4;     // s between the velocities of an interval, at least
 constexpr double kLongestInterval = 1.6;
@@ -33,6 +33,35 @@ double residual_of(const Matrix3d& correlation, double squares) {
 
 }  // namespace
 
+Reading with_bias(const NavigationLog& log, Reading reading) {
+  constexpr double kStep = 0.04;  // rad/s
+  constexpr double kLargestBias = 0.2;
+  const auto squared = [&](const Reading& r) {
+    const double misfit = ForceMatch(log, r).misfit();
+    return misfit * misfit;
+  };
+  double here = squared(reading);
+  for (int sweep = 0; sweep < 2 && std::isfinite(here); ++sweep) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      // The minimum of the parabola through three points.
+      Reading low = reading, high = reading, best = reading;
+      low.gyroscope_bias[axis] -= kStep;
+      high.gyroscope_bias[axis] += kStep;
+      const double below = squared(low);
+      const double above = squared(high);
+      const double curvature = below - 2 * here + above;
+      if (!(curvature > 0)) continue;
+      const double bias = reading.gyroscope_bias[axis] + 0.5 * kStep * (below - above) / curvature;
+      best.gyroscope_bias[axis] = std::clamp(bias, -kLargestBias, kLargestBias);
+      if (const double there = squared(best); there < here) {
+        here = there;
+        reading = best;
+      }
+    }
+  }
+  return reading;
+}
+
 ForceMatch::ForceMatch(const NavigationLog& log, const Reading& reading) {
   if (log.imu.empty()) return;
   zero_ = log.imu.front().time;
@@ -45,7 +74,8 @@ ForceMatch::ForceMatch(const NavigationLog& log, const Reading& reading) {
     if (t > kLongest) break;
     if (!times_.empty()) {
       const double step = t - times_.back();
-      const Vector3d rate = reading.gyroscope_scale * log.imu[i].angular_rate.cwiseProduct(signs);
+      const Vector3d rate =
+          reading.gyroscope_scale * log.imu[i].angular_rate.cwiseProduct(signs) - reading.gyroscope_bias;
       turned = (turned * rotation_exp(Vector3d(rate * step))).normalized();
       integral += step * (turned * log.imu[i].specific_force);
     }

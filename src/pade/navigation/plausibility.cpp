@@ -122,7 +122,7 @@ void check_upright(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) 
 /// The mean velocity between two fixes, from the velocities in between.
 void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
   constexpr double kStep = 2;  // s
-  double path = 0, along = 0, along_swapped = 0, moved2 = 0, flown2 = 0, farthest = 0;
+  double path = 0, along = 0, along_swapped = 0, moved2 = 0, flown2 = 0, noise2 = 0, farthest = 0;
   std::size_t next = 0;
   const GnssFix* last = nullptr;
   Vector3d flown = Vector3d::Zero();
@@ -144,6 +144,7 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
       along_swapped += moved.dot(Vector3d(flown.y(), flown.x(), -flown.z()));
       moved2 += moved.squaredNorm();
       flown2 += flown.squaredNorm();
+      noise2 += fix.covariance.trace() + last->covariance.trace();
     }
     last = &fix;
     flown.setZero();
@@ -160,6 +161,8 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
                     path, std::sqrt(moved2 / flown2)),
         "name the columns lat, lon, alt, and they become metres around the first fix");
   }
+  // What the errors of the positions explain is no contradiction.
+  if (moved2 + flown2 - 2 * along < 2 * noise2) return;
   if (along_swapped > 1.3 * std::max(along, 0.0) && along_swapped > 0.7 * std::sqrt(moved2 * flown2)) {
     return add(
         hints, "gnss-axes", HintSeverity::error,
@@ -182,7 +185,7 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
 
 /// What of the readings of IMU and GNSS fits best.
 void check_readings(const NavigationLog& log, std::vector<Hint>& hints) {
-  const ForceMatch given(log, {});
+  const ForceMatch given(log, with_bias(log, {}));
   const double as_given = given.misfit();
   if (!std::isfinite(as_given)) return;
   constexpr double kSuspicious = 1.0;  // m/s²
@@ -195,23 +198,24 @@ void check_readings(const NavigationLog& log, std::vector<Hint>& hints) {
   };
   constexpr double kDegree = 0.017453292519943295;
   const std::array candidates = {
-      Candidate{{kDegree, false, false},
+      Candidate{{kDegree, false, Vector3d::Zero(), false},
                 "gyro-unit",
                 "when the angular rates are read as deg/s",
                 "convert the angular rates to rad/s, or write the unit into the heading (gx [deg/s])"},
-      Candidate{{1, true, false},
+      Candidate{{1, true, Vector3d::Zero(), false},
                 "gyro-axes",
                 "when y and z of the angular rates are turned round",
                 "gyroscopes and accelerometers are in different axes (FLU and FRD): convert one of them"},
-      Candidate{{1, false, true},
+      Candidate{{1, false, Vector3d::Zero(), true},
                 "gnss-axes",
                 "when the GNSS velocities are read as north, east, down",
                 "write '# frame=NED' into the first line of the GNSS log, or name its columns vN vE vD"}};
   const Candidate* best = nullptr;
   double least = kClearly * as_given;
   for (const Candidate& candidate : candidates) {
-    const double misfit = ForceMatch(log, candidate.reading).misfit();
-    if (as_given > kSuspicious && misfit < least) {
+    if (as_given <= kSuspicious) break;
+    const double misfit = ForceMatch(log, with_bias(log, candidate.reading)).misfit();
+    if (misfit < least) {
       least = misfit;
       best = &candidate;
     }

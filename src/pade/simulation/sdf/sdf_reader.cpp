@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <sdf/sdf.hh>
 
+#include "pade/io/text.hpp"
 #include "pade/simulation/sdf/sdf_repair.hpp"
 #include "pade/simulation/sdf/sdf_sensors.hpp"
 #include "pade/simulation/sdf/sdf_warnings.hpp"
@@ -123,7 +124,12 @@ Result<sdf::SDFPtr> Reader::parse() {
   sdf::ParserConfig config;
   const auto find = [this](const std::string& uri) {
     const auto found = resolve_uri(uri, file_.parent_path(), resources_);
-    return found ? found->string() : std::string();
+    if (!found) return std::string();
+    // libsdformat takes a folder only with a model.config, but any file.
+    const bool described =
+        io::path_exists(*found / "model.config") || io::path_exists(*found / "manifest.xml");
+    const auto file = described ? std::nullopt : model_file(*found);
+    return file ? file->string() : found->string();
   };
   config.SetFindCallback(find);
   const FindCallback global(find);
