@@ -133,7 +133,6 @@ Result<sdf::SDFPtr> Reader::parse() {
   };
   config.SetFindCallback(find);
   const FindCallback global(find);
-  for (const fs::path& folder : resources_) config.AddURIPath("model://", folder.string());
   auto document = std::make_shared<sdf::SDF>();
   sdf::init(document);
   const ConsoleCapture console;
