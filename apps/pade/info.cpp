@@ -19,7 +19,6 @@
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/sequence.hpp"
-#include "pade/io/text.hpp"
 #include "pade/report/accuracy_tables.hpp"
 #include "pade/report/run_evaluation.hpp"
 
@@ -286,15 +285,6 @@ Status inform_of_sequence(const Arguments& arguments) {
   return {};
 }
 
-/// What the side-car of a map says; zero where there is none.
-Eigen::Vector3d local_origin_of(const fs::path& map_file) {
-  const fs::path side_car = io::side_car_of(map_file);
-  const auto text = io::read_file(side_car);
-  if (!text) return Eigen::Vector3d::Zero();
-  const auto origin = io::decode_local_origin(*text, side_car.string());
-  return origin ? *origin : Eigen::Vector3d(Eigen::Vector3d::Zero());
-}
-
 Status inform_of_map(const Arguments& arguments) {
   const Result<mapping::OccupancyMap> map = io::read_map(arguments.path);
   if (!map) return map.error();
@@ -304,7 +294,7 @@ Status inform_of_map(const Arguments& arguments) {
   const double occupied = static_cast<double>(counts.occupied) * cube;
   const double free = static_cast<double>(counts.free) * cube;
   const Eigen::AlignedBox3d bounds = map->bounds();
-  const Eigen::Vector3d origin = local_origin_of(arguments.path);
+  const Eigen::Vector3d origin = io::local_origin_of(arguments.path);
   if (arguments.json) {
     Json json = {{"kind", "map"},
                  {"file", arguments.path},

@@ -248,4 +248,12 @@ Result<Eigen::Vector3d> decode_local_origin(std::string_view content, std::strin
   return Eigen::Vector3d((*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>());
 }
 
+Eigen::Vector3d local_origin_of(const std::filesystem::path& map_file) {
+  const std::filesystem::path side_car = side_car_of(map_file);
+  const auto text = read_file(side_car);
+  const auto origin =
+      text ? decode_local_origin(*text, side_car.string()) : Result<Eigen::Vector3d>(text.error());
+  return origin ? *origin : Eigen::Vector3d(Eigen::Vector3d::Zero());
+}
+
 }  // namespace pade::io

@@ -47,4 +47,7 @@ Result<std::optional<GeographicOrigin>> decode_side_car(std::string_view content
 /// The local origin in a side-car; zero where it has none.
 Result<Eigen::Vector3d> decode_local_origin(std::string_view content, std::string_view file);
 
+/// The local origin beside a map file; zero where there is no side-car, or none in it.
+Eigen::Vector3d local_origin_of(const std::filesystem::path& map_file);
+
 }  // namespace pade::io
