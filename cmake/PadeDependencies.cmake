@@ -1,5 +1,5 @@
-# The libraries that pade needs. Read by the build and, installed, by padeConfig.cmake, so that the two cannot
-# drift apart. Third-party headers are SYSTEM: their warnings are not ours.
+# The libraries that pade needs, room by room. Read by the build and, installed, by padeConfig.cmake, so that the two
+# cannot drift apart. Third-party headers are SYSTEM: their warnings are not ours.
 
 macro(pade_find)
   if(CMAKE_FIND_PACKAGE_NAME STREQUAL "pade")
@@ -9,25 +9,33 @@ macro(pade_find)
   endif()
 endmacro()
 
-list(APPEND CMAKE_MODULE_PATH /usr/share/cmake/geographiclib)  # where Debian puts FindGeographicLib.cmake
-pade_find(Eigen3 3.4 NO_MODULE)
-pade_find(PadeOpenCV)
-pade_find(octomap 1.9)
-pade_find(GeographicLib 2.1)
-pade_find(yaml-cpp 0.7)
-pade_find(nlohmann_json 3.11)
-pade_find(fmt 9)
-pade_find(spdlog 1.10)
-pade_find(Threads)
-
-# These two come with variables, or with targets without their include folder.
-if(NOT TARGET pade::octomap)
-  add_library(pade::octomap INTERFACE IMPORTED)
-  target_include_directories(pade::octomap SYSTEM INTERFACE ${OCTOMAP_INCLUDE_DIRS})
-  target_link_libraries(pade::octomap INTERFACE octomap octomath)
-endif()
-if(NOT TARGET pade::geographiclib)
-  add_library(pade::geographiclib INTERFACE IMPORTED)
-  target_include_directories(pade::geographiclib SYSTEM INTERFACE ${GeographicLib_INCLUDE_DIRS})
-  target_link_libraries(pade::geographiclib INTERFACE ${GeographicLib_LIBRARIES})
-endif()
+# pade_find_dependencies_of(<room>...): core, navigation, flow, depth, mapping, io, pade (the mapper).
+macro(pade_find_dependencies_of)
+  set(_pade_rooms ${ARGN})
+  pade_find(Eigen3 3.4 NO_MODULE)
+  if(NOT "${_pade_rooms}" STREQUAL "navigation")
+    pade_find(PadeOpenCV)
+    pade_find(Threads)
+  endif()
+  if("mapping" IN_LIST _pade_rooms OR "io" IN_LIST _pade_rooms OR "pade" IN_LIST _pade_rooms)
+    pade_find(octomap 1.9)
+    if(NOT TARGET pade::octomap)  # it comes with variables, or with targets without their include folder
+      add_library(pade::octomap INTERFACE IMPORTED)
+      target_include_directories(pade::octomap SYSTEM INTERFACE ${OCTOMAP_INCLUDE_DIRS})
+      target_link_libraries(pade::octomap INTERFACE octomap octomath)
+    endif()
+  endif()
+  if("io" IN_LIST _pade_rooms)
+    list(APPEND CMAKE_MODULE_PATH /usr/share/cmake/geographiclib)  # where Debian puts FindGeographicLib.cmake
+    pade_find(PadeOpenCV COMPONENTS imgcodecs)
+    pade_find(GeographicLib 2.1)
+    pade_find(yaml-cpp 0.7)
+    pade_find(nlohmann_json 3.11)
+    pade_find(fmt 9)
+    if(NOT TARGET pade::geographiclib)
+      add_library(pade::geographiclib INTERFACE IMPORTED)
+      target_include_directories(pade::geographiclib SYSTEM INTERFACE ${GeographicLib_INCLUDE_DIRS})
+      target_link_libraries(pade::geographiclib INTERFACE ${GeographicLib_LIBRARIES})
+    endif()
+  endif()
+endmacro()

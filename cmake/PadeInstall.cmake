@@ -4,15 +4,43 @@ include(CMakePackageConfigHelpers)
 
 set(pade_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pade)
 
-install(TARGETS pade EXPORT padeTargets COMPONENT libpade-dev)
+# The rooms that users take alone, and their public headers: these, and what they include. Everything else may change
+# from one version to the next and is not installed.
+set(pade_public_headers
+  pade.hpp
+  core/camera.hpp
+  core/depth_image.hpp
+  core/flow_field.hpp
+  core/frame.hpp
+  core/lie.hpp
+  core/options.hpp
+  core/pose.hpp
+  core/result.hpp
+  core/sensors/measurements.hpp
+  core/time.hpp
+  navigation/filter_options.hpp
+  navigation/measurement.hpp
+  navigation/navigator.hpp
+  flow/flow_estimator.hpp
+  depth/depth_estimator.hpp
+  depth/depth_options.hpp
+  depth/derotation.hpp
+  depth/edges.hpp
+  depth/focus_of_expansion.hpp
+  depth/motion_refinement.hpp
+  mapping/occupancy_map.hpp
+  io/atomic_output.hpp
+  io/formats/map_files.hpp
+  io/world.hpp
+  pipeline/obstacle_mapper.hpp)
+install(TARGETS pade_pose pade_core pade_navigation pade_flow pade_depth pade_mapping pade_io pade
+        EXPORT padeTargets COMPONENT libpade-dev)
 install(EXPORT padeTargets NAMESPACE pade:: DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
-if(TARGET pade_simulation)  # find_package(pade COMPONENTS simulation) gives pade::simulation
-  set_target_properties(pade_simulation PROPERTIES EXPORT_NAME simulation)
-  install(TARGETS pade_simulation EXPORT padeSimulationTargets COMPONENT libpade-dev)
-  install(EXPORT padeSimulationTargets NAMESPACE pade:: DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
-endif()
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/pade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libpade-dev
-        FILES_MATCHING PATTERN "*.hpp")
+foreach(header IN LISTS pade_public_headers)
+  get_filename_component(folder ${header} DIRECTORY)
+  install(FILES ${PROJECT_SOURCE_DIR}/src/pade/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pade/${folder}
+          COMPONENT libpade-dev)
+endforeach()
 install(FILES ${PROJECT_BINARY_DIR}/generated/pade/core/version.hpp
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pade/core COMPONENT libpade-dev)
 
@@ -49,7 +77,7 @@ set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_DEPENDS
     "libeigen3-dev (>= 3.4), libopencv-core-dev (>= 4.6), libopencv-imgproc-dev, libopencv-imgcodecs-dev, \
 libopencv-video-dev, liboctomap-dev (>= 1.9), libgeographiclib-dev (>= 2.1), libyaml-cpp-dev (>= 0.7), \
-nlohmann-json3-dev (>= 3.11), libfmt-dev (>= 9), libspdlog-dev (>= 1:1.10)")
+nlohmann-json3-dev (>= 3.11), libfmt-dev (>= 9)")
 set(CPACK_COMPONENT_PADE_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: the program.")
 set(CPACK_COMPONENT_LIBPADE-DEV_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: library, headers and CMake files.")
 include(CPack)

@@ -12,8 +12,9 @@
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/sequence/sequence.hpp"
-#include "pade/report/accuracy_tables.hpp"
+#include "pade/io/text.hpp"
 #include "pade/report/run_evaluation.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
 #include "evaluate_map.hpp"
@@ -52,7 +53,7 @@ Result<DepthAccuracy> accuracy_of(const std::string& folder, const Arguments& ar
   if (!run) return run.error();
   const bool asked = !arguments.sequence.empty();
   const std::filesystem::path source = asked ? std::filesystem::path(arguments.sequence) : run->info.sequence;
-  if (asked || (!run->depth_times.empty() && std::filesystem::exists(source))) {
+  if (asked || (!run->depth_times.empty() && io::path_exists(source))) {
     const Result<io::Sequence> sequence = open_as_the_run_did(source, *run);
     if (!sequence && asked) return sequence.error();
     if (sequence && (asked || sequence->has_truth())) return evaluation::evaluate_stack(*run, *sequence);

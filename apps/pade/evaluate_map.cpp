@@ -21,7 +21,7 @@
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/pipeline/map_replay.hpp"
-#include "pade/report/map_accuracy_tables.hpp"
+#include "pade/report/tables/map_accuracy_tables.hpp"
 #include "pade/simulation/render/truth.hpp"
 #include "pade/simulation/sdf/sdf_reader.hpp"
 #include "pade/simulation/world/world_solids.hpp"

@@ -19,8 +19,8 @@
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/sequence.hpp"
-#include "pade/report/accuracy_tables.hpp"
 #include "pade/report/run_evaluation.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
 

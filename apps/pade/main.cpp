@@ -1,4 +1,6 @@
 // The `pade` command line: one file per subcommand, no algorithm inside.
+#include <cstdio>
+#include <exception>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -7,7 +9,9 @@
 
 #include "commands.hpp"
 
-int main(int argc, char** argv) {
+namespace {
+
+int run(int argc, char** argv) {
   CLI::App app("PADE: obstacle maps from one camera and a GPS/INS.", "pade");
   app.set_version_flag("--version", "pade " + std::string(pade::version));
   app.require_subcommand(1);
@@ -23,4 +27,18 @@ int main(int argc, char** argv) {
   pade::cli::add_completion(app, context);
   CLI11_PARSE(app, argc, argv);
   return context.exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // Our own code throws nothing; the libraries below it do: no memory, a full /tmp.
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& failure) {
+    std::fprintf(stderr, "pade: stopped by %s\n", failure.what());
+  } catch (...) {
+    std::fputs("pade: stopped by an unknown failure\n", stderr);
+  }
+  return 1;
 }

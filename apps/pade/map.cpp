@@ -13,7 +13,7 @@
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
 #include "pade/pipeline/map_sequence.hpp"
-#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
 #include "enum_option.hpp"
@@ -60,7 +60,7 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   if (!arguments.config.empty()) {
     const auto text = io::read_file(arguments.config);
     if (!text) return text.error();
-    if (Status status = io::from_yaml(*text, arguments.config, options); !status) return status.error();
+    if (Status status = read_options(*text, arguments.config, options); !status) return status.error();
   }
   ObstacleMapperOptions& mapper = options.mapper;
   set(mapper.flow, arguments.flow);
@@ -82,7 +82,7 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.world_up, arguments.world_up);
   set(options.sequence.origin, arguments.origin);
   set(options.sequence.camera, arguments.camera);
-  set(options.imu, arguments.imu);
+  if (arguments.imu) set_imu(options, *arguments.imu);
   options.sequence.strict = options.sequence.strict || arguments.strict;
   options.world_coordinates = options.world_coordinates || arguments.world_coordinates;
   options.pcd = options.pcd || arguments.pcd;

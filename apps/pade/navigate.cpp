@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -14,8 +15,9 @@
 #include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
-#include "pade/pipeline/navigation_report.hpp"
-#include "pade/pipeline/navigation_run.hpp"
+#include "pade/navigation/navigation_run.hpp"
+#include "pade/pipeline/checked_log.hpp"
+#include "pade/report/navigation_report.hpp"
 
 #include "commands.hpp"
 
@@ -101,7 +103,9 @@ Result<NavigationRunOptions> run_options(const Arguments& arguments, const Navig
   return options;
 }
 
-nlohmann::json summary(const NavigationRun& run, const std::vector<Hint>& hints) {
+using Score = std::optional<evaluation::MotionSummary>;
+
+nlohmann::json summary(const NavigationRun& run, const Score& score, const std::vector<Hint>& hints) {
   nlohmann::json sensors = nlohmann::json::array();
   for (const auto& sensor : run.sensors) {
     sensors.push_back({{"sensor", sensor.sensor},
@@ -127,20 +131,20 @@ nlohmann::json summary(const NavigationRun& run, const std::vector<Hint>& hints)
                          {"restarts", run.health.restarts},
                          {"sensors", std::move(sensors)},
                          {"hints", std::move(list)}};
-  if (run.score) {
-    json["against_truth"] = {{"pairs", run.score->pairs},
-                             {"translation_median_m", run.score->translation_median},
-                             {"translation_95_m", run.score->translation_95},
-                             {"rotation_95_deg", run.score->rotation_95 / kDegree},
-                             {"nees_mean", run.score->nees_mean},
-                             {"rotation_nees_mean", run.score->rotation_nees_mean},
-                             {"length_nees_mean", run.score->length_nees_mean},
-                             {"direction_95_deg", run.score->direction_95 / kDegree},
-                             {"direction_nees_mean", run.score->direction_nees_mean},
-                             {"scale_valid_where_good", run.score->valid_where_good},
-                             {"scale_invalid_where_bad", run.score->invalid_where_bad},
-                             {"direction_valid_where_good", run.score->direction_valid_where_good},
-                             {"direction_invalid_where_bad", run.score->direction_invalid_where_bad}};
+  if (score) {
+    json["against_truth"] = {{"pairs", score->pairs},
+                             {"translation_median_m", score->translation_median},
+                             {"translation_95_m", score->translation_95},
+                             {"rotation_95_deg", score->rotation_95 / kDegree},
+                             {"nees_mean", score->nees_mean},
+                             {"rotation_nees_mean", score->rotation_nees_mean},
+                             {"length_nees_mean", score->length_nees_mean},
+                             {"direction_95_deg", score->direction_95 / kDegree},
+                             {"direction_nees_mean", score->direction_nees_mean},
+                             {"scale_valid_where_good", score->valid_where_good},
+                             {"scale_invalid_where_bad", score->invalid_where_bad},
+                             {"direction_valid_where_good", score->direction_valid_where_good},
+                             {"direction_invalid_where_bad", score->direction_invalid_where_bad}};
   }
   return json;
 }
@@ -159,14 +163,15 @@ Status navigate(const Arguments& arguments) {
   const NavigationRun run = run_navigation(*log, *options);
   if (run.frames.empty()) return never_aligned(arguments.log, *checked, run);
   const std::vector<Hint> hints = all_hints(*checked, run);
-  nlohmann::json json = summary(run, hints);
+  const Score score = score_motions(*log, *options, run);
+  nlohmann::json json = summary(run, score, hints);
   json["remarks"] = log->remarks;
   const std::string title = "Navigation of " + std::filesystem::path(arguments.log).filename().string();
   for (const auto& [file, content] :
        {std::pair<std::string, std::string>{"trajectory.txt", format_trajectory(run)},
         {kMarker, format_relative_motion(run)},
         {"navigation.json", json.dump(2) + "\n"},
-        {"report.html", navigation_report(title, *log, run)}}) {
+        {"report.html", navigation_report(title, *log, run, score)}}) {
     if (Status written = output->write(file, content); !written) return written;
   }
   if (Status committed = output->commit(); !committed) return committed;
@@ -182,12 +187,12 @@ Status navigate(const Arguments& arguments) {
     fmt::print("{}: {} measurements, {} refused, mean χ² {:.2f} per component (1 is consistent)\n",
                sensor.sensor, sensor.measurements, sensor.refused, sensor.chi_square);
   }
-  if (run.score) {
+  if (score) {
     fmt::print(
         "against truth, frame to frame: translation {:.2f} cm median, {:.2f} cm 95 % (NEES {:.2f}); rotation "
         "{:.4f}° 95 % (NEES {:.2f}); 3 is consistent\n",
-        100 * run.score->translation_median, 100 * run.score->translation_95, run.score->nees_mean,
-        run.score->rotation_95 / kDegree, run.score->rotation_nees_mean);
+        100 * score->translation_median, 100 * score->translation_95, score->nees_mean,
+        score->rotation_95 / kDegree, score->rotation_nees_mean);
   }
   fmt::print("{}\n", (std::filesystem::path(arguments.out) / "report.html").string());
   return {};

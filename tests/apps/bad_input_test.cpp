@@ -188,5 +188,14 @@ TEST_F(BadInput, EvaluateAndInfoOfWhatIsNoRun) {
   EXPECT_EQ(shell(kPade + " evaluate " + out().string()).code, 1);
 }
 
+TEST_F(BadInput, AConfigurationWhoseNumbersMakeNoSense) {
+  const std::string config = (flight() / "config.yaml").string();
+  for (const auto& [text, named] : {std::pair{"cloud: {spacing: 0}", "cloud.spacing"},
+                                    std::pair{"mapper: {depth: {parallax_gate: .nan}}", "parallax_gate"}}) {
+    std::ofstream(config) << text << '\n';
+    expect_refused(map("--config " + config), named);
+  }
+}
+
 }  // namespace
 }  // namespace pade

@@ -23,14 +23,14 @@ using test::Outcome;
 using test::shell;
 
 /// The sample flight that ctest has made once for all tests.
-const std::string kSample = PADE_SAMPLE_FLIGHT;
+const std::string kSampleFlight = PADE_SAMPLE_FLIGHT;
 
 class Experiment : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     root_ = std::make_unique<test::TemporaryFolder>();
-    ASSERT_TRUE(fs::exists(kSample)) << "run through ctest, or make it: pade sample --frames 5 --out "
-                                     << kSample;
+    ASSERT_TRUE(fs::exists(kSampleFlight))
+        << "run through ctest, or make it: pade sample --frames 5 --out " << kSampleFlight;
   }
   static void TearDownTestSuite() { root_.reset(); }
 
@@ -39,7 +39,7 @@ class Experiment : public testing::Test {
     return shell(kPade + " experiment " + arguments);
   }
   static std::string on_flight(const std::string& table, const std::string& out) {
-    return table + " --flow dis-ultrafast --jobs 1 --sequences " + kSample + " --out " + at(out);
+    return table + " --flow dis-ultrafast --jobs 1 --sequences " + kSampleFlight + " --out " + at(out);
   }
   static void expect_refused(const Outcome& outcome, const std::string& named, const std::string& out) {
     EXPECT_NE(outcome.code, 0) << outcome.text;
@@ -52,18 +52,18 @@ class Experiment : public testing::Test {
 
 TEST_F(Experiment, RefusesWhatItDoesNotKnow) {
   expect_refused(experiment(on_flight("table9", "none")), "table9", "none");
-  expect_refused(experiment("table1 --flow magic --sequences " + kSample + " --out " + at("none")), "magic",
-                 "none");
+  expect_refused(experiment("table1 --flow magic --sequences " + kSampleFlight + " --out " + at("none")),
+                 "magic", "none");
   for (const char* shard : {"0/3", "4/3", "1", "a/b", "1/0", "1.5/3"})
     expect_refused(experiment(on_flight("table1", "none") + " --shard " + shard), "expected i/n", "none");
   expect_refused(experiment("table1 --sequences " + at("nowhere") + " --out " + at("none")), "nowhere",
                  "none");
   expect_refused(experiment("merge --out " + at("none")), "expected those of the shards", "none");
-  expect_refused(experiment("merge " + kSample + " --out " + at("none")), "plan.json", "none");
+  expect_refused(experiment("merge " + kSampleFlight + " --out " + at("none")), "plan.json", "none");
 }
 
 TEST_F(Experiment, RefusesASequenceWithoutTruth) {
-  fs::copy(kSample, root_->path() / "blind", fs::copy_options::recursive);
+  fs::copy(kSampleFlight, root_->path() / "blind", fs::copy_options::recursive);
   fs::remove_all(root_->path() / "blind" / "depth");
   fs::remove(root_->path() / "blind" / "depth.txt");
   expect_refused(experiment("table1 --sequences " + at("blind") + " --out " + at("none")), "no true depth",
@@ -71,9 +71,10 @@ TEST_F(Experiment, RefusesASequenceWithoutTruth) {
 }
 
 TEST_F(Experiment, RefusesAPlaceThatCannotBeWritten) {
-  expect_refused(experiment("table1 --sequences " + kSample + " --out /proc/none"), "/proc/none", "none");
+  expect_refused(experiment("table1 --sequences " + kSampleFlight + " --out /proc/none"), "/proc/none",
+                 "none");
   std::ofstream(root_->path() / "file") << "x";
-  const Outcome outcome = experiment("table1 --sequences " + kSample + " --out " + at("file"));
+  const Outcome outcome = experiment("table1 --sequences " + kSampleFlight + " --out " + at("file"));
   EXPECT_EQ(outcome.code, 1);
   EXPECT_THAT(outcome.text, HasSubstr("found a file"));
 }

@@ -63,6 +63,7 @@ TEST(Architecture, ARoomIncludesOnlyWhatTheDesignAllows) {
   int includes = 0;
   for (const fs::path& file : sources_under(kRoot / "src" / "pade")) {
     const std::string room = file.lexically_relative(kRoot / "src" / "pade").begin()->string();
+    if (room == "pade.hpp") continue;  // of all rooms
     for (const std::string& header : pade_includes(read(file))) {
       ++includes;
       if (!allowed(rules, room, header)) broken.push_back(shown(file) + " includes pade/" + header);

@@ -57,7 +57,7 @@ TEST(RunHints, AreNoneForARunThatIsGoodButForAFewThings) {
   EXPECT_THAT(hints_of(info), IsEmpty());
 }
 
-struct Case {
+struct HintCase {
   const char* name;
   std::function<void(io::RunInfo&)> spoil;
   const char* id;
@@ -65,7 +65,7 @@ struct Case {
   const char* advice;
 };
 
-class RunHint : public testing::TestWithParam<Case> {};
+class RunHint : public testing::TestWithParam<HintCase> {};
 
 TEST_P(RunHint, NamesTheReasonAndWhatToTry) {
   io::RunInfo info = good_run();
@@ -77,110 +77,110 @@ TEST_P(RunHint, NamesTheReasonAndWhatToTry) {
 
 INSTANTIATE_TEST_SUITE_P(
     Of, RunHint,
-    testing::Values(Case{"NoPairs",
-                         [](io::RunInfo& run) {
-                           run.health.depth_images = 0;
-                           run.health.frames_used = 3;
-                         },
-                         "no-depth", "only 3 frames", "--step 1"},
-                    Case{"PosesTooUncertain",
-                         [](io::RunInfo& run) {
-                           empty(run);
-                           run.map->depths_uncertain = run.map->depths - run.map->depths_beyond;
-                           run.motion.rotation_sigma = 0.25;
-                           run.motion.direction_sigma = 4.5;
-                         },
-                         "empty-map", "0.25° in rotation and 4.5° in direction", "better poses"},
-                    Case{"PosesTooUncertainAndNotRefined",
-                         [](io::RunInfo& run) {
-                           empty(run);
-                           run.options = R"({"mapper":{"refinement":{"on":false}}})";
-                           run.map->depths_uncertain = run.map->depths - run.map->depths_beyond;
-                           run.motion.rotation_sigma = 0.25;
-                         },
-                         "empty-map", "0.25° in rotation", "--refine-motion on"},
-                    Case{"TooLittleParallaxForTheMap",
-                         [](io::RunInfo& run) {
-                           empty(run);
-                           run.map->depths_uncertain = run.map->depths - run.map->depths_beyond;
-                           run.motion.baseline = 0.012;
-                         },
-                         "empty-map", "moves 1.2 cm", "--step"},
-                    Case{"RangeTooSmall",
-                         [](io::RunInfo& run) {
-                           empty(run);
-                           run.map->depths_beyond = run.map->depths;
-                           run.map->depths_uncertain = 0;
-                         },
-                         "empty-map", "range of 20 m", "--map-range"},
-                    Case{"AllOutside",
-                         [](io::RunInfo& run) {
-                           empty(run);
-                           run.map->points_outside = 400;
-                         },
-                         "empty-map", "reaches 3277 m", "--origin flight"},
-                    Case{"Scattered",
-                         [](io::RunInfo& run) {
-                           empty(run);
-                           run.map->hits = 0;
-                         },
-                         "empty-map", "scattered", "--voxel"},
-                    Case{"TakenBack", [](io::RunInfo& run) { empty(run); }, "empty-map",
-                         "3000 hits were taken back", "pade info"},
-                    Case{"EmptyForWantOfTexture",
-                         [](io::RunInfo& run) {
-                           empty(run);
-                           only(run, DepthState::no_texture);
-                         },
-                         "empty-map", "no texture", "exposure"},
-                    Case{"Hover",
-                         [](io::RunInfo& run) {
-                           only(run, DepthState::low_parallax);
-                           run.motion = {49, 49, 0.001, 0, 0};
-                         },
-                         "standing-still", "100 %", "--step"},
-                    Case{"LowParallax", [](io::RunInfo& run) { only(run, DepthState::low_parallax); },
-                         "mostly-unmeasured", "hardly moves", "--step"},
-                    Case{"AtTheEpipole", [](io::RunInfo& run) { only(run, DepthState::epipole); },
-                         "mostly-unmeasured", "epipole", "sideways"},
-                    Case{"WrongPoses", [](io::RunInfo& run) { only(run, DepthState::inconsistent); },
-                         "mostly-unmeasured", "contradict the poses", "pade info"},
-                    Case{"FastTurns", [](io::RunInfo& run) { only(run, DepthState::out_of_view); },
-                         "mostly-unmeasured", "share little", "more frames per second"},
-                    Case{"MaskedAway",
-                         [](io::RunInfo& run) {
-                           only(run, DepthState::out_of_view);
-                           run.masked_share = 0.9;
-                         },
-                         "mostly-unmeasured", "mask covers 90 %", "mask.png"},
-                    Case{"LargeMask", [](io::RunInfo& run) { run.masked_share = 0.6; }, "large-mask", "60 %",
-                         "mask.png"},
-                    Case{"SomeOutside", [](io::RunInfo& run) { run.map->points_outside = 100; },
-                         "outside-map", "22 % of the points", "--origin flight"},
-                    Case{"MostlyUncertain", [](io::RunInfo& run) { run.map->depths_uncertain = 600; },
-                         "mostly-uncertain", "92 % of the depths", "--step"},
-                    Case{"BeyondTheMap",
-                         [](io::RunInfo& run) {
-                           run.map->depths_beyond = 500;
-                           run.map->depths_uncertain = 0;
-                         },
-                         "beyond-map", "71 % of the depths", "--map-range"},
-                    Case{"NothingFree", [](io::RunInfo& run) { run.map->free_voxels = 0; }, "nothing-free",
-                         "no free space", "pade info"},
-                    Case{"FramesWithoutPose",
-                         [](io::RunInfo& run) {
-                           run.health.frames_used = 30;
-                           run.health.frames_without_pose = 20;
-                         },
-                         "poses-refused", "20 of 50 frames (40 %)", "times"},
-                    Case{"ScaleInvalid", [](io::RunInfo& run) { run.health.motions_without_scale = 40; },
-                         "poses-too-short", "40 motions", "--step"},
-                    Case{"DamagedImages",
-                         [](io::RunInfo& run) {
-                           run.health.frames_used = 30;
-                           run.health.skipped = {{"rgb/1.png", "found 0 bytes"}};
-                         },
-                         "frames-skipped", "found 0 bytes", "damaged"}),
+    testing::Values(HintCase{"NoPairs",
+                             [](io::RunInfo& run) {
+                               run.health.depth_images = 0;
+                               run.health.frames_used = 3;
+                             },
+                             "no-depth", "only 3 frames", "--step 1"},
+                    HintCase{"PosesTooUncertain",
+                             [](io::RunInfo& run) {
+                               empty(run);
+                               run.map->depths_uncertain = run.map->depths - run.map->depths_beyond;
+                               run.motion.rotation_sigma = 0.25;
+                               run.motion.direction_sigma = 4.5;
+                             },
+                             "empty-map", "0.25° in rotation and 4.5° in direction", "better poses"},
+                    HintCase{"PosesTooUncertainAndNotRefined",
+                             [](io::RunInfo& run) {
+                               empty(run);
+                               run.options = R"({"mapper":{"refinement":{"on":false}}})";
+                               run.map->depths_uncertain = run.map->depths - run.map->depths_beyond;
+                               run.motion.rotation_sigma = 0.25;
+                             },
+                             "empty-map", "0.25° in rotation", "--refine-motion on"},
+                    HintCase{"TooLittleParallaxForTheMap",
+                             [](io::RunInfo& run) {
+                               empty(run);
+                               run.map->depths_uncertain = run.map->depths - run.map->depths_beyond;
+                               run.motion.baseline = 0.012;
+                             },
+                             "empty-map", "moves 1.2 cm", "--step"},
+                    HintCase{"RangeTooSmall",
+                             [](io::RunInfo& run) {
+                               empty(run);
+                               run.map->depths_beyond = run.map->depths;
+                               run.map->depths_uncertain = 0;
+                             },
+                             "empty-map", "range of 20 m", "--map-range"},
+                    HintCase{"AllOutside",
+                             [](io::RunInfo& run) {
+                               empty(run);
+                               run.map->points_outside = 400;
+                             },
+                             "empty-map", "reaches 3277 m", "--origin flight"},
+                    HintCase{"Scattered",
+                             [](io::RunInfo& run) {
+                               empty(run);
+                               run.map->hits = 0;
+                             },
+                             "empty-map", "scattered", "--voxel"},
+                    HintCase{"TakenBack", [](io::RunInfo& run) { empty(run); }, "empty-map",
+                             "3000 hits were taken back", "pade info"},
+                    HintCase{"EmptyForWantOfTexture",
+                             [](io::RunInfo& run) {
+                               empty(run);
+                               only(run, DepthState::no_texture);
+                             },
+                             "empty-map", "no texture", "exposure"},
+                    HintCase{"Hover",
+                             [](io::RunInfo& run) {
+                               only(run, DepthState::low_parallax);
+                               run.motion = {49, 49, 0.001, 0, 0};
+                             },
+                             "standing-still", "100 %", "--step"},
+                    HintCase{"LowParallax", [](io::RunInfo& run) { only(run, DepthState::low_parallax); },
+                             "mostly-unmeasured", "hardly moves", "--step"},
+                    HintCase{"AtTheEpipole", [](io::RunInfo& run) { only(run, DepthState::epipole); },
+                             "mostly-unmeasured", "epipole", "sideways"},
+                    HintCase{"WrongPoses", [](io::RunInfo& run) { only(run, DepthState::inconsistent); },
+                             "mostly-unmeasured", "contradict the poses", "pade info"},
+                    HintCase{"FastTurns", [](io::RunInfo& run) { only(run, DepthState::out_of_view); },
+                             "mostly-unmeasured", "share little", "more frames per second"},
+                    HintCase{"MaskedAway",
+                             [](io::RunInfo& run) {
+                               only(run, DepthState::out_of_view);
+                               run.masked_share = 0.9;
+                             },
+                             "mostly-unmeasured", "mask covers 90 %", "mask.png"},
+                    HintCase{"LargeMask", [](io::RunInfo& run) { run.masked_share = 0.6; }, "large-mask",
+                             "60 %", "mask.png"},
+                    HintCase{"SomeOutside", [](io::RunInfo& run) { run.map->points_outside = 100; },
+                             "outside-map", "22 % of the points", "--origin flight"},
+                    HintCase{"MostlyUncertain", [](io::RunInfo& run) { run.map->depths_uncertain = 600; },
+                             "mostly-uncertain", "92 % of the depths", "--step"},
+                    HintCase{"BeyondTheMap",
+                             [](io::RunInfo& run) {
+                               run.map->depths_beyond = 500;
+                               run.map->depths_uncertain = 0;
+                             },
+                             "beyond-map", "71 % of the depths", "--map-range"},
+                    HintCase{"NothingFree", [](io::RunInfo& run) { run.map->free_voxels = 0; },
+                             "nothing-free", "no free space", "pade info"},
+                    HintCase{"FramesWithoutPose",
+                             [](io::RunInfo& run) {
+                               run.health.frames_used = 30;
+                               run.health.frames_without_pose = 20;
+                             },
+                             "poses-refused", "20 of 50 frames (40 %)", "times"},
+                    HintCase{"ScaleInvalid", [](io::RunInfo& run) { run.health.motions_without_scale = 40; },
+                             "poses-too-short", "40 motions", "--step"},
+                    HintCase{"DamagedImages",
+                             [](io::RunInfo& run) {
+                               run.health.frames_used = 30;
+                               run.health.skipped = {{"rgb/1.png", "found 0 bytes"}};
+                             },
+                             "frames-skipped", "found 0 bytes", "damaged"}),
     [](const auto& instance) { return instance.param.name; });
 
 TEST(RunHints, PixelsWithABoundAreNotUnmeasured) {

@@ -11,7 +11,7 @@
 namespace pade::depth {
 namespace {
 
-const Camera kCamera = simulation::analytic_camera(160, 120);
+const Camera kBoundCamera = simulation::analytic_camera(160, 120);
 
 double one_sided(double k) { return 0.5 * std::erfc(k / std::sqrt(2.0)); }
 
@@ -38,7 +38,7 @@ struct Count {
 class Bound : public ::testing::TestWithParam<Eigen::Vector3d> {};
 
 TEST_P(Bound, IsBrokenNoMoreOftenThanNormalFlowNoiseAllows) {
-  const ScenePair pair(kCamera, GetParam(), {0.004, -0.006, 0.005});
+  const ScenePair pair(kBoundCamera, GetParam(), {0.004, -0.006, 0.005});
   for (const double k : {1.0, 2.0, 3.0}) {
     Count count;
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -57,7 +57,7 @@ TEST_P(Bound, IsBrokenNoMoreOftenThanNormalFlowNoiseAllows) {
 }
 
 TEST_P(Bound, KeepsItsPromiseWithPosesAsUncertainAsTheirCovariance) {
-  const ScenePair pair(kCamera, GetParam(), {0.004, -0.006, 0.005});
+  const ScenePair pair(kBoundCamera, GetParam(), {0.004, -0.006, 0.005});
   RelativeMotion motion = pair.motion;
   const double sigma_t = 0.03 * motion.t_reference_other.norm();
   constexpr double kSigmaTheta = 0.0005;
@@ -86,13 +86,13 @@ INSTANTIATE_TEST_SUITE_P(EachMotion, Bound,
 
 TEST(BoundAtTheEpipole, NeedsTexture) {
   // Forward to a wall: around the epipole the flow is nearly zero at any depth of interest.
-  const cv::Size size = kCamera.size();
+  const cv::Size size = kBoundCamera.size();
   const RelativeMotion motion{Eigen::Matrix3d::Identity(), {0, 0, 0.3}};
   Random random(3);
   cv::Mat textured(size, CV_8UC1);
   for (auto& value : cv::Mat_<std::uint8_t>(textured))
     value = cv::saturate_cast<std::uint8_t>(random.uniform(0, 255));
-  const cv::Point centre(static_cast<int>(kCamera.cx), static_cast<int>(kCamera.cy));
+  const cv::Point centre(static_cast<int>(kBoundCamera.cx), static_cast<int>(kBoundCamera.cy));
   const cv::Rect middle(centre.x - 20, centre.y - 20, 40, 40);
   cv::Mat blank = textured.clone();
   blank(middle) = 120;
@@ -103,8 +103,8 @@ TEST(BoundAtTheEpipole, NeedsTexture) {
   DepthOptions options;
   options.flow_sigma = 0.1;
   const auto bounds_near_the_epipole = [&](const cv::Mat& image) {
-    const DepthImage depth =
-        DepthEstimator(options).estimate({kCamera, motion, still, Derotation::flow, image, image.clone()});
+    const DepthImage depth = DepthEstimator(options).estimate(
+        {kBoundCamera, motion, still, Derotation::flow, image, image.clone()});
     EXPECT_GT(cv::countNonZero(depth.bound == depth.bound),
               static_cast<int>(0.8 * (size.area() - middle.area())));
     const cv::Mat around = depth.bound(cv::Rect(centre.x - 3, centre.y - 3, 8, 8));
@@ -116,8 +116,8 @@ TEST(BoundAtTheEpipole, NeedsTexture) {
 }
 
 TEST(BoundOfAMask, EndsWhereTheOtherFrameSeesNothing) {
-  const ScenePair pair(kCamera, {0.2, 0, 0}, Eigen::Vector3d::Zero());
-  cv::Mat valid(kCamera.size(), CV_8UC1, cv::Scalar(255));
+  const ScenePair pair(kBoundCamera, {0.2, 0, 0}, Eigen::Vector3d::Zero());
+  cv::Mat valid(kBoundCamera.size(), CV_8UC1, cv::Scalar(255));
   valid.colRange(60, 90) = 0;
   DepthOptions options;
   options.flow_sigma = 0.1;
@@ -125,8 +125,8 @@ TEST(BoundOfAMask, EndsWhereTheOtherFrameSeesNothing) {
   input.valid = valid;
   const DepthImage depth = DepthEstimator(options).estimate(input);
   int beside = 0;
-  for (int v = 0; v < kCamera.height; ++v) {
-    for (int u = 0; u < kCamera.width; ++u) {
+  for (int v = 0; v < kBoundCamera.height; ++v) {
+    for (int u = 0; u < kBoundCamera.width; ++u) {
       const auto& w = pair.exact.flow.vectors.at<cv::Vec2f>(v, u);
       const long x = std::lround(static_cast<double>(u) + static_cast<double>(w[0]));
       const bool hidden = valid.at<std::uint8_t>(v, u) == 0 || (x >= 60 && x < 90);

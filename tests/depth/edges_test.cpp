@@ -157,88 +157,24 @@ TEST(Edges, WithoutARadiusNothingChanges) {
   EXPECT_TRUE(empty.empty());
 }
 
-/// A wall at Z = 10 m straight ahead, nothing measured: bounds as parallax of `sigma` px per metre of motion
-/// gives them around the epipole in the middle.
-struct BlindSpot {
-  BlindSpot() {
-    camera.width = 161;
-    camera.height = 121;
-    camera.fx = camera.fy = 500;
-    camera.cx = 80;
-    camera.cy = 60;
-    motion.t_reference_other = {0, 0, -0.8};
-    const cv::Size size(161, 121);
-    image.depth = cv::Mat(size, CV_32FC1, cv::Scalar(kNan));
-    image.variance = image.depth.clone();
-    image.own_variance = image.depth.clone();
-    image.state = cv::Mat(size, CV_8UC1, cv::Scalar(static_cast<int>(DepthState::low_parallax)));
-    image.bound = image.depth.clone();
-    for (int v = 0; v < size.height; ++v) {
-      for (int u = 0; u < size.width; ++u) {
-        const double reach = 0.8 * std::hypot(u - 80, v - 60);
-        const auto bound = static_cast<float>(reach / (reach / 10.8 + 1) - 0.8);
-        if (bound > 0) image.bound.at<float>(v, u) = bound;
+TEST(Edges, NothingAboutAWrongMatchKeepsABound) {
+  constexpr auto kInconsistent = static_cast<std::uint8_t>(DepthState::inconsistent);
+  for (const int radius : {1, 3, 5}) {
+    DepthImage image = measured(cv::Mat(40, 60, CV_32FC1, cv::Scalar(5)));
+    image.state.at<std::uint8_t>(20, 30) = kInconsistent;
+    for (cv::Mat* plane : {&image.depth, &image.variance, &image.own_variance})
+      plane->at<float>(20, 30) = kNan;
+    EdgeOptions options;
+    options.radius = radius;
+    guard_edges(image, options);
+    for (int v = 0; v < 40; ++v) {
+      for (int u = 0; u < 60; ++u) {
+        const bool about = std::abs(v - 20) <= radius && std::abs(u - 30) <= radius;
+        ASSERT_EQ(std::isnan(image.bound.at<float>(v, u)), about) << v << " " << u;
       }
     }
+    EXPECT_EQ(cv::countNonZero(image.state == kMeasured), 40 * 60 - 1);
   }
-  Camera camera;
-  RelativeMotion motion;
-  DepthImage image;
-};
-
-bool unchanged(const cv::Mat& a, const cv::Mat& b) {
-  const cv::Mat both_nan = ~cv::Mat(a == a) & ~cv::Mat(b == b);
-  return cv::countNonZero((a == b) | both_nan) == static_cast<int>(a.total());
-}
-
-TEST(Epipole, IsClosedUpToWhereItHidesNoMoreThanTheHole) {
-  for (const double hole : {0.03, 0.05, 0.1}) {
-    BlindSpot spot;
-    const cv::Mat before = spot.image.bound.clone();
-    close_epipole(spot.image, spot.camera, spot.motion, hole);
-    const float closed = spot.image.bound.at<float>(60, 80);
-    ASSERT_GT(closed, 1) << hole;
-    EXPECT_LT(closed, 10) << hole;
-    for (int v = 0; v < before.rows; ++v) {
-      for (int u = 0; u < before.cols; ++u) {
-        const float was = before.at<float>(v, u);
-        const float is = spot.image.bound.at<float>(v, u);
-        const bool raised = std::isnan(was) ? !std::isnan(is) : is > was;
-        if (raised) {
-          EXPECT_EQ(is, closed);  // and a thing there, at that depth, is no larger than the hole
-          EXPECT_LE(2 * std::hypot(u - 80, v - 60) * is / 500, hole + 1e-6);
-        } else {
-          EXPECT_TRUE(is == was || (std::isnan(is) && std::isnan(was)));
-        }
-      }
-    }
-  }
-}
-
-TEST(Epipole, KeepsWhatIsMeasuredWithoutTextureOrBesideANearThing) {
-  BlindSpot spot;
-  spot.image.state.at<std::uint8_t>(60, 80) = static_cast<std::uint8_t>(DepthState::no_texture);
-  spot.image.state.at<std::uint8_t>(60, 81) = kMeasured;
-  spot.image.bound.at<float>(60, 81) = 0.4F;
-  close_epipole(spot.image, spot.camera, spot.motion, 0.05);
-  EXPECT_TRUE(std::isnan(spot.image.bound.at<float>(60, 80)));
-  EXPECT_EQ(spot.image.bound.at<float>(60, 81), 0.4F);
-
-  BlindSpot beside;  // a near thing all around it: no ring is bounded far enough
-  beside.image.bound.colRange(0, 76).setTo(0.5F);
-  const cv::Mat before = beside.image.bound.clone();
-  close_epipole(beside.image, beside.camera, beside.motion, 0.05);
-  EXPECT_TRUE(unchanged(before, beside.image.bound));
-}
-
-TEST(Epipole, IsLeftAloneWithoutAHoleOrForwardMotion) {
-  BlindSpot spot;
-  const cv::Mat before = spot.image.bound.clone();
-  close_epipole(spot.image, spot.camera, spot.motion, 0);
-  EXPECT_TRUE(unchanged(before, spot.image.bound));
-  spot.motion.t_reference_other = {0.8, 0, 0.01};
-  close_epipole(spot.image, spot.camera, spot.motion, 0.05);
-  EXPECT_TRUE(unchanged(before, spot.image.bound));
 }
 
 }  // namespace

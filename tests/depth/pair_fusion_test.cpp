@@ -9,11 +9,11 @@
 namespace pade::depth {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoDepth = std::numeric_limits<float>::quiet_NaN();
 
 struct Pixel {
   DepthState state;
-  float z = kNan, variance = kNan, bound = kNan;
+  float z = kNoDepth, variance = kNoDepth, bound = kNoDepth;
 };
 
 DepthImage image(const Pixel& pixel) {
@@ -47,51 +47,51 @@ TEST(PairFusion, EachCaseOfTwoPixels) {
       {"disagree, the shorter is nearer",
        {measured, 3, 1e-4F, 2.5F},
        {measured, 5, 1e-4F, 4.6F},
-       {inconsistent, kNan, kNan, 2.5F}},
+       {inconsistent, kNoDepth, kNoDepth, 2.5F}},
       {"disagree, the longer is nearer",
        {measured, 5, 1e-4F, 4.6F},
        {measured, 3, 1e-4F, 2.5F},
-       {inconsistent, kNan, kNan, 2.5F}},
+       {inconsistent, kNoDepth, kNoDepth, 2.5F}},
       {"disagree, one without a bound",
-       {measured, 5, 1e-4F, kNan},
+       {measured, 5, 1e-4F, kNoDepth},
        {measured, 3, 1e-4F, 2.5F},
-       {inconsistent, kNan, kNan, kNan}},
+       {inconsistent, kNoDepth, kNoDepth, kNoDepth}},
       {"only the shorter: the longer's match left the image",
        {measured, 2, 0.1F, 1.5F},
        {out_of_view},
        {measured, 2, 0.1F, 1.5F}},
       {"only the longer: too little parallax in the shorter",
-       {low_parallax, kNan, kNan, 8},
+       {low_parallax, kNoDepth, kNoDepth, 8},
        {measured, 12, 0.3F, 10},
        {measured, 12, 0.3F, 10}},
       {"only the longer, in front of the shorter's bound",
-       {low_parallax, kNan, kNan, 8},
+       {low_parallax, kNoDepth, kNoDepth, 8},
        {measured, 6, 0.3F, 5},
-       {inconsistent, kNan, kNan, 5}},
+       {inconsistent, kNoDepth, kNoDepth, 5}},
       {"only the longer, and the shorter contradicts it",
        {inconsistent},
        {measured, 6, 0.3F, 5},
-       {inconsistent, kNan, kNan, kNan}},
+       {inconsistent, kNoDepth, kNoDepth, kNoDepth}},
       {"only the longer, whose match the shorter cannot see",
        {out_of_view},
        {measured, 6, 0.3F, 5},
-       {inconsistent, kNan, kNan, kNan}},
+       {inconsistent, kNoDepth, kNoDepth, kNoDepth}},
       {"neither, the longer reaches farther",
-       {low_parallax, kNan, kNan, 8},
-       {far, kNan, kNan, 30},
-       {far, kNan, kNan, 30}},
+       {low_parallax, kNoDepth, kNoDepth, 8},
+       {far, kNoDepth, kNoDepth, 30},
+       {far, kNoDepth, kNoDepth, 30}},
       {"neither, the shorter reaches farther",
-       {low_parallax, kNan, kNan, 8},
-       {epipole, kNan, kNan, 3},
-       {low_parallax, kNan, kNan, 8}},
+       {low_parallax, kNoDepth, kNoDepth, 8},
+       {epipole, kNoDepth, kNoDepth, 3},
+       {low_parallax, kNoDepth, kNoDepth, 8}},
       {"neither, only the shorter has a bound",
-       {low_parallax, kNan, kNan, 8},
+       {low_parallax, kNoDepth, kNoDepth, 8},
        {out_of_view},
-       {low_parallax, kNan, kNan, 8}},
+       {low_parallax, kNoDepth, kNoDepth, 8}},
       {"neither, only the longer has a bound",
        {no_texture},
-       {low_parallax, kNan, kNan, 8},
-       {low_parallax, kNan, kNan, 8}},
+       {low_parallax, kNoDepth, kNoDepth, 8},
+       {low_parallax, kNoDepth, kNoDepth, 8}},
   };
   for (const Case& c : cases) {
     const DepthImage shorter = image(c.shorter);

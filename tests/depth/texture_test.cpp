@@ -29,7 +29,7 @@ cv::Mat grating(cv::Size size, double kx, double ky) {
 }
 
 const cv::Size kSize(161, 83);  // not a multiple of the block
-const Camera kCamera{kSize.width, kSize.height, 150, 150, 80, 41};
+const Camera kTextureCamera{kSize.width, kSize.height, 150, 150, 80, 41};
 
 RelativeMotion moving(const Eigen::Vector3d& t) {
   RelativeMotion motion;
@@ -42,7 +42,7 @@ constexpr TextureLimits kLimits{3, 0.5};
 
 int blank_pixels(const cv::Mat& first, const cv::Mat& second, const Eigen::Vector3d& t) {
   const double noise = image_noise(first, second, kStill);
-  const cv::Mat gate = texture_gate(first, second, kStill, kCamera, moving(t), kLimits, noise);
+  const cv::Mat gate = texture_gate(first, second, kStill, kTextureCamera, moving(t), kLimits, noise);
   return cv::countNonZero(gate == static_cast<int>(DepthState::no_texture));
 }
 
@@ -75,7 +75,8 @@ TEST(TextureGate, ShadingIsNoTextureButFaintTextureThatBothImagesShowIs) {
 }
 
 cv::Mat gate_of(const cv::Mat& first, const cv::Mat& second, const RelativeMotion& motion) {
-  return texture_gate(first, second, kStill, kCamera, motion, kLimits, image_noise(first, second, kStill));
+  return texture_gate(first, second, kStill, kTextureCamera, motion, kLimits,
+                      image_noise(first, second, kStill));
 }
 
 TEST(TextureGate, AtTheEpipoleTextureMustRunInEveryDirection) {

@@ -16,7 +16,7 @@
 namespace pade::evaluation {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoDepth = std::numeric_limits<float>::quiet_NaN();
 constexpr double kBucket = 1.0 / 2048;
 
 cv::Mat row(std::initializer_list<float> values) {
@@ -148,7 +148,7 @@ TEST(DepthAccuracy, BinsByTruthWithTheLimitInTheFartherRange) {
 
 TEST(DepthAccuracy, NoDepthLowersTheCoverageAndNothingElse) {
   Accumulator accumulator(20);
-  accumulator.add(estimate_of(row({kNaN, 0, -2, 20.001F, 3})), row({2, 2, 2, 2, 2}));
+  accumulator.add(estimate_of(row({kNoDepth, 0, -2, 20.001F, 3})), row({2, 2, 2, 2, 2}));
   const RangeAccuracy range = accumulator.result().ranges[0];
   EXPECT_DOUBLE_EQ(range.coverage, 0.2);
   EXPECT_DOUBLE_EQ(range.mean, 1);
@@ -158,7 +158,8 @@ TEST(DepthAccuracy, NoDepthLowersTheCoverageAndNothingElse) {
 
 TEST(DepthAccuracy, PixelsWithoutTruthDoNotCount) {
   Accumulator accumulator;
-  accumulator.add(estimate_of(row({1, 1, 1, 1})), row({kNaN, 0, std::numeric_limits<float>::infinity(), -1}));
+  accumulator.add(estimate_of(row({1, 1, 1, 1})),
+                  row({kNoDepth, 0, std::numeric_limits<float>::infinity(), -1}));
   EXPECT_EQ(accumulator.result().all.truth_pixels, 0U);
   EXPECT_TRUE(std::isnan(accumulator.result().all.coverage));
   EXPECT_TRUE(std::isnan(accumulator.result().all.deviation));
@@ -188,7 +189,7 @@ TEST(DepthAccuracy, AveragesSequencesNotPixels) {
 }
 
 TEST(RelativeError, IsSignedAndNaNWhereUnknown) {
-  const cv::Mat error = relative_error(estimate_of(row({3, 1, kNaN, 1})), row({2, 2, 2, kNaN}));
+  const cv::Mat error = relative_error(estimate_of(row({3, 1, kNoDepth, 1})), row({2, 2, 2, kNoDepth}));
   EXPECT_FLOAT_EQ(error.at<float>(0), 0.5F);
   EXPECT_FLOAT_EQ(error.at<float>(1), -0.5F);
   EXPECT_TRUE(std::isnan(error.at<float>(2)));

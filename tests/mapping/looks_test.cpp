@@ -31,7 +31,7 @@ Pose level_at(double x, double y = 0.03) {
   return pose;
 }
 
-OccupancyMap new_map(const MapOptions& options = {}) {
+OccupancyMap map_of_looks(const MapOptions& options = {}) {
   return std::move(OccupancyMap::create(options)).value();
 }
 
@@ -70,7 +70,7 @@ std::size_t occupied(const OccupancyMap& map) { return map.counts().occupied; }
 
 TEST(TwoLooks, BoundsAloneClearACorridorAfterTwoPlacesAndNotAfterOne) {
   const DepthImage image = bounded_to(10);
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   const MapChange first = map.integrate(image, kCamera, level_at(0));
   EXPECT_GT(first.pending_free, 10000U);
   for (int i = 0; i < 5; ++i) {
@@ -85,7 +85,7 @@ TEST(TwoLooks, BoundsAloneClearACorridorAfterTwoPlacesAndNotAfterOne) {
 }
 
 TEST(TwoLooks, TheTwoNeedNotBeNeighboursInTime) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   map.integrate(bounded_to(10), kCamera, level_at(0));
   map.integrate(nothing_known(), kCamera, level_at(0.2));
   EXPECT_EQ(map.counts().free, 0U);
@@ -94,7 +94,7 @@ TEST(TwoLooks, TheTwoNeedNotBeNeighboursInTime) {
 }
 
 TEST(TwoLooks, OneOfAnotherPlaceThatSawAnObstacleConfirmsNothing) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   map.integrate(bounded_to(4), kCamera, level_at(0));
   const MapChange change = map.integrate(bounded_to(10), kCamera, level_at(0.2));
   EXPECT_EQ(map.at({3, 0.03, 1.53}), Occupancy::free);
@@ -106,7 +106,7 @@ TEST(Bounds, AThinPoleIsNeverClearedThrough) {
   // A vertical line at (6, 0.08), 2 pixels wide, with a near bound or none, before a wall far behind it; one
   // pixel in 50 of the rest knows nothing.
   for (const bool is_known : {true, false}) {
-    OccupancyMap map = new_map();
+    OccupancyMap map = map_of_looks();
     std::mt19937_64 random(5);
     for (int k = 0; k < 12; ++k) {
       const Pose pose = level_at(0.4 * k, 0.03 + 0.04 * k);
@@ -126,45 +126,95 @@ TEST(Bounds, AThinPoleIsNeverClearedThrough) {
   }
 }
 
-TEST(Bounds, AHoleHidesWhatIsBehindItOnlyWhereMoreThanFreeHoleFits) {
-  // A hole of n pixels leaves everything unknown behind free_hole f / n.
+TEST(Bounds, ASpotHidesWhatIsBehindItOnlyWhereMoreThanFreeHoleFits) {
+  // A spot of n pixels that knows nothing, or sees to 1 m only, leaves everything unknown behind free_hole f
+  // / n.
   const double f = kCamera.fx;
-  for (const int n : {1, 2, 4}) {
-    MapOptions options;
-    options.looks_baseline = 0;
-    OccupancyMap map = new_map(options);
-    DepthImage image = bounded_to(18);
-    image.bound(cv::Rect(80, 60, n, n)).setTo(kNaN);
-    map.integrate(image, kCamera, level_at(0));
-    const double end = std::min(options.free_hole * f / n, 18.0);
-    const Vector3d ray = level_at(0).rotation * Vector3d((80 + 0.5 * (n - 1) - kCamera.cx) / f,
-                                                         (60 + 0.5 * (n - 1) - kCamera.cy) / f, 1);
-    for (double z = 0.5; z < 17.9; z += 0.05) {
-      const Occupancy state = map.at(level_at(0).translation + z * ray);
-      const bool is_between = z >= end - 0.2 && z <= end;  // within the voxel that the end divides
-      if (is_between) continue;
-      EXPECT_EQ(state, z < end ? Occupancy::free : Occupancy::unknown) << n << " at " << z;
+  for (const int n : {1, 2, 3, 4, 7}) {
+    for (const float sight : {kNaN, 1.0F}) {
+      MapOptions options;
+      options.looks_baseline = 0;
+      OccupancyMap map = map_of_looks(options);
+      DepthImage image = bounded_to(18);
+      image.bound(cv::Rect(80, 60, n, n)).setTo(sight);
+      map.integrate(image, kCamera, level_at(0));
+      const double end = std::min(options.free_hole * f / n, 18.0);
+      const double surely = std::max(std::isnan(sight) ? 0.0 : 1.0, end / 1.3);  // sizes are tried by steps
+      const Vector3d ray = level_at(0).rotation * Vector3d((80 + 0.5 * (n - 1) - kCamera.cx) / f,
+                                                           (60 + 0.5 * (n - 1) - kCamera.cy) / f, 1);
+      for (double z = 0.5; z < 17.9; z += 0.05) {
+        const Occupancy state = map.at(level_at(0).translation + z * ray);
+        if (z < surely - 0.2) {
+          EXPECT_EQ(state, Occupancy::free) << n << " at " << z;
+        }
+        if (z > std::max(end, 1.0) + 0.2) {
+          EXPECT_EQ(state, Occupancy::unknown) << n << " at " << z;
+        }
+      }
     }
   }
 }
 
-TEST(Bounds, AHoleIsFilledWithTheNearestBoundAroundIt) {
+TEST(Bounds, ASpotThatHasMeasuredSomethingIsNotClosed) {
   MapOptions options;
   options.looks_baseline = 0;
-  OccupancyMap map = new_map(options);
+  for (const bool is_measured : {true, false}) {
+    OccupancyMap map = map_of_looks(options);
+    DepthImage image = bounded_to(15);
+    image.bound.at<float>(60, 80) = 2;
+    if (is_measured) {
+      image.depth.at<float>(60, 80) = 2.2F;
+      image.state.at<std::uint8_t>(60, 80) = static_cast<std::uint8_t>(DepthState::measured);
+      image.variance.at<float>(60, 80) = image.own_variance.at<float>(60, 80) = 1e-4F;
+    }
+    map.integrate(image, kCamera, level_at(0));
+    const Vector3d ray =
+        level_at(0).rotation * Vector3d((80 - kCamera.cx) / kCamera.fx, (60 - kCamera.cy) / kCamera.fy, 1);
+    EXPECT_EQ(map.at(level_at(0).translation + 3.0 * ray),
+              is_measured ? Occupancy::unknown : Occupancy::free);
+  }
+}
+
+TEST(Bounds, TheBlindSpotAboutTheEpipoleIsClosedAsFarAsItHidesNothing) {
+  // Bounds as parallax of 1 px per metre of motion gives them 0.8 m before a wall at 15 m.
+  MapOptions options;
+  options.looks_baseline = 0;
+  OccupancyMap map = map_of_looks(options);
+  DepthImage image = bounded_to(15);
+  for (int v = 0; v < image.bound.rows; ++v) {
+    for (int u = 0; u < image.bound.cols; ++u) {
+      const double reach = 0.8 * std::hypot(u - 80, v - 60);
+      image.bound.at<float>(v, u) = static_cast<float>(reach / (reach / 15.8 + 0.5));
+    }
+  }
+  map.integrate(image, kCamera, level_at(0));
+  const Vector3d ray =
+      level_at(0).rotation * Vector3d((80 - kCamera.cx) / kCamera.fx, (60 - kCamera.cy) / kCamera.fy, 1);
+  double free_to = 0.6;
+  while (map.at(level_at(0).translation + (free_to + 0.05) * ray) == Occupancy::free) free_to += 0.05;
+  EXPECT_GT(free_to, 1.5);
+  int spot = 0;  // pixels of the row that see less far
+  for (int u = 0; u < image.bound.cols; ++u) spot += image.bound.at<float>(60, u) < free_to - 0.1 ? 1 : 0;
+  EXPECT_LE(spot * free_to / kCamera.fx, options.free_hole + 0.02);
+}
+
+TEST(Bounds, AHoleIsFilledNoFartherThanTheNearestBoundAroundIt) {
+  MapOptions options;
+  options.looks_baseline = 0;
+  OccupancyMap map = map_of_looks(options);
   DepthImage image = bounded_to(15);
   image.bound(cv::Rect(50, 30, 20, 60)).setTo(6);  // a thing with a hole at its edge
   image.bound.at<float>(60, 70) = kNaN;
   map.integrate(image, kCamera, level_at(0));
   const Vector3d ray = level_at(0).rotation * Vector3d((70 - kCamera.cx) / kCamera.fx, 0.5 / kCamera.fx, 1);
-  EXPECT_EQ(map.at(level_at(0).translation + 5.0 * ray), Occupancy::free);
+  EXPECT_EQ(map.at(level_at(0).translation + 4.3 * ray), Occupancy::free);
   EXPECT_EQ(map.at(level_at(0).translation + 6.3 * ray), Occupancy::unknown);
 }
 
 TEST(Bounds, AHoleAtTheBorderMayGoOnBeyondIt) {
   MapOptions options;
   options.looks_baseline = 0;
-  OccupancyMap map = new_map(options);
+  OccupancyMap map = map_of_looks(options);
   DepthImage image = bounded_to(15);
   image.bound.at<float>(60, 0) = kNaN;
   map.integrate(image, kCamera, level_at(0));
@@ -177,7 +227,7 @@ TEST(Bounds, AVoxelThatIsHitIsNotClearedByTheSameImage) {
   // Bounds that contradict the depth.
   MapOptions options;
   options.looks_baseline = 0;
-  OccupancyMap map = new_map(options);
+  OccupancyMap map = map_of_looks(options);
   DepthImage image = wall(5.04, 0, 0);
   image.bound.setTo(12);
   map.integrate(image, kCamera, level_at(0));
@@ -187,7 +237,7 @@ TEST(Bounds, AVoxelThatIsHitIsNotClearedByTheSameImage) {
 }
 
 TEST(Bounds, OneThatContradictsAnObstacleDoesNotClearIt) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   map.integrate(bounded_to(12), kCamera, level_at(0));
   map.integrate(wall(5.04, 0, 0), kCamera, level_at(0.2));
   const Vector3d point(5.24, 0.03, 1.53);
@@ -199,11 +249,11 @@ TEST(Bounds, OneThatContradictsAnObstacleDoesNotClearIt) {
 }
 
 TEST(Hits, ANearGoodOneIsAnObstacleAtOnceAndAFarOneWaitsForAnotherPlace) {
-  OccupancyMap near = new_map();
+  OccupancyMap near = map_of_looks();
   near.integrate(wall(5.04, 0.02, 0), kCamera, level_at(0));
   EXPECT_GT(occupied(near), 500U);
 
-  OccupancyMap far = new_map();
+  OccupancyMap far = map_of_looks();
   for (int i = 0; i < 4; ++i) {
     const MapChange change = far.integrate(wall(12.04, 0.02, 0), kCamera, level_at(0));
     EXPECT_EQ(occupied(far), 0U);
@@ -214,7 +264,7 @@ TEST(Hits, ANearGoodOneIsAnObstacleAtOnceAndAFarOneWaitsForAnotherPlace) {
 }
 
 TEST(Hits, ASigmaThatIsCommonToTheImageMovesTheSurfaceAndDoesNotRemoveIt) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   for (int k = 0; k < 4; ++k)
     map.integrate(wall(10.04 - 0.2 * k, 0.02, 0.5, 1, kLarge), kLarge, level_at(0.2 * k));
   EXPECT_EQ(map.at({10.04, 0.03, 1.53}), Occupancy::occupied);
@@ -223,7 +273,7 @@ TEST(Hits, ASigmaThatIsCommonToTheImageMovesTheSurfaceAndDoesNotRemoveIt) {
 
 TEST(Hits, UncertainOnesAddUpToASurfaceWhereItIs) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    OccupancyMap map = new_map();
+    OccupancyMap map = map_of_looks();
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     map.integrate(wall(6.04, 0.3, 0, seed, kLarge), kLarge, level_at(0));
@@ -240,7 +290,7 @@ TEST(Hits, UncertainOnesAddUpToASurfaceWhereItIs) {
 }
 
 TEST(Hits, ADepthThatIsLessCertainThanTheRelativeLimitIsCountedAndPlacesNothing) {
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   for (int k = 0; k < 5; ++k) {
     const MapChange change = map.integrate(wall(5, 0.1, 1.5), kCamera, level_at(0.2 * k));
     EXPECT_EQ(change.too_uncertain, static_cast<std::size_t>(kCamera.width) * kCamera.height);
@@ -251,7 +301,7 @@ TEST(Hits, ADepthThatIsLessCertainThanTheRelativeLimitIsCountedAndPlacesNothing)
 
 TEST(Hits, ThoseThatWaitAreForgottenBehindTheVehicle) {
   // Walls that are never at the same place again, over 30 m.
-  OccupancyMap map = new_map();
+  OccupancyMap map = map_of_looks();
   std::size_t most_early = 0;
   std::size_t most_late = 0;
   for (int k = 0; k < 60; ++k) {

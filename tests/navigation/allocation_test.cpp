@@ -26,7 +26,7 @@ extern "C" void* malloc(std::size_t size) noexcept {
 namespace pade::navigation {
 namespace {
 
-Time at(double seconds) { return Time::from_seconds(seconds); }
+Time moment(double seconds) { return Time::from_seconds(seconds); }
 
 TEST(Navigator, AllocatesNothingAfterTheStart) {
 #ifndef PADE_COUNTS_ALLOCATIONS
@@ -35,21 +35,22 @@ TEST(Navigator, AllocatesNothingAfterTheStart) {
   const NavigationLog log =
       record(Flight{}, 25, simulation::ImuModel::industrial(), simulation::GnssModel::single_point(), 1);
   Navigator navigator(NavigatorOptions{});
-  navigator.add(Heading{at(1), 0.7, 0.03});
+  navigator.add(Heading{moment(1), 0.7, 0.03});
   std::size_t next = 0;
   std::size_t before = 0;
   std::size_t questions = 0;
   for (std::size_t i = 0; i < log.imu.size(); ++i) {
     if (i == 1000) before = allocations;
     // A late GNSS epoch every time: replay is part of the loop.
-    while (next < log.gnss.fixes.size() && log.gnss.fixes[next].time < at(log.imu[i].time.seconds() - 0.15)) {
+    while (next < log.gnss.fixes.size() &&
+           log.gnss.fixes[next].time < moment(log.imu[i].time.seconds() - 0.15)) {
       navigator.add(log.gnss.velocities[next]);
       navigator.add(log.gnss.fixes[next++]);
     }
     navigator.add(log.imu[i]);
     if (i > 1000 && i % 20 == 0) {
       const Time now = log.imu[i].time;
-      questions += navigator.relative_pose(at(now.seconds() - 0.1), now, Pose{}).answer == Answer::valid;
+      questions += navigator.relative_pose(moment(now.seconds() - 0.1), now, Pose{}).answer == Answer::valid;
       questions += navigator.absolute_pose(now).answer == Answer::valid;
       questions += navigator.health().status == NavigationStatus::navigating;
     }

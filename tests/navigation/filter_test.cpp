@@ -8,9 +8,9 @@
 namespace pade::navigation {
 namespace {
 
-const Vector3d kLever(0.2, 0, 0.1);
+const Vector3d kAntenna(0.2, 0, 0.1);
 
-Time at(double seconds) { return Time::from_seconds(seconds); }
+Time stamp(double seconds) { return Time::from_seconds(seconds); }
 
 BaseMatrix loose_covariance() {
   BaseMatrix P = BaseMatrix::Zero();
@@ -19,7 +19,7 @@ BaseMatrix loose_covariance() {
   return P;
 }
 
-Filter started(const Vector3d& lever = kLever) {
+Filter started(const Vector3d& lever = kAntenna) {
   Filter filter(FilterOptions{}, lever);
   filter.start(NavigationState{}, loose_covariance());
   return filter;
@@ -30,7 +30,7 @@ void fly(Filter& filter, double until) {
   const auto rate = [](double t) { return Vector3d(0.3 * std::sin(3 * t), 0.2, 0.5 * std::cos(2 * t)); };
   const auto force = [](double t) { return Vector3d(std::sin(2 * t), 0.5 * std::cos(3 * t), 9.8); };
   for (double t = filter.state().time.seconds(); t < until - 1e-9; t += 0.005) {
-    filter.propagate(at(t + 0.005), rate(t + 0.0025), force(t + 0.0025), rate(t + 0.005));
+    filter.propagate(stamp(t + 0.005), rate(t + 0.0025), force(t + 0.0025), rate(t + 0.005));
   }
 }
 
@@ -64,8 +64,8 @@ TEST(Vibration, IsTheSpreadOfTheSamplesWhateverTheMotion) {
     const double t = 0.005 * i;
     const Vector3d rate(std::sin(5 * t), 0.5 * std::cos(3 * t), 1);
     const Vector3d force(3 * std::sin(4 * t), 2 * std::cos(2 * t), 9.8);
-    calm.observe({at(t), rate, force}, 0.06);
-    vibration.observe({at(t), rate + 0.1 * random.normal3(), force + 0.7 * random.normal3()}, 0.06);
+    calm.observe({stamp(t), rate, force}, 0.06);
+    vibration.observe({stamp(t), rate + 0.1 * random.normal3(), force + 0.7 * random.normal3()}, 0.06);
   }
   EXPECT_LT(calm.rate_variance.maxCoeff(), 1e-7);
   EXPECT_LT(calm.force_variance.maxCoeff(), 1e-6);
@@ -80,7 +80,7 @@ TEST(Vibration, DoesNotTakeAGapForVibration) {
   Vibration vibration;
   for (int i = 0; i < 2000; ++i) {
     const double t = i < 1000 ? 0.005 * i : 0.005 * i + 0.8;
-    vibration.observe({at(t), Vector3d(0.5 * t, 0, 0), Vector3d(0, 0, 9.8 + t)}, 0.06);
+    vibration.observe({stamp(t), Vector3d(0.5 * t, 0, 0), Vector3d(0, 0, 9.8 + t)}, 0.06);
   }
   EXPECT_LT(vibration.rate_variance.maxCoeff(), 1e-7);
   EXPECT_LT(vibration.force_variance.maxCoeff(), 1e-4);
@@ -93,10 +93,10 @@ TEST(Filter, GrowsItsDoubtWithTheVibration) {
     Random random(4);
     for (int i = 1; i <= 1000; ++i) {
       const Vector3d force = Vector3d(0, 0, 9.8) + (k == 0 ? 0.1 : 4.0) * random.normal3();
-      filter.propagate(at(0.005 * i), Vector3d::Zero(), force, Vector3d::Zero());
-      filter.observe({at(0.005 * i), Vector3d::Zero(), force});
+      filter.propagate(stamp(0.005 * i), Vector3d::Zero(), force, Vector3d::Zero());
+      filter.observe({stamp(0.005 * i), Vector3d::Zero(), force});
       if (i % 40 == 0)
-        filter.update(GnssVelocity{at(0.005 * i), filter.state().X.v, 2.5e-3 * Matrix3d::Identity()});
+        filter.update(GnssVelocity{stamp(0.005 * i), filter.state().X.v, 2.5e-3 * Matrix3d::Identity()});
     }
     sigma[k] = std::sqrt(filter.covariance()(kNu, kNu));
   }
@@ -161,7 +161,7 @@ TEST(Filter, RelativeCovarianceMatchesManyRunsWithErrorsDrawnFromTheStartingCova
                                        .accelerometer_noise = 0,
                                        .gyroscope_vibration = 0,
                                        .accelerometer_vibration = 0},
-                         kLever);
+                         kAntenna);
   noiseless_model.start(NavigationState{}, loose_covariance());
   fly(noiseless_model, 0.2);
   noiseless_model.clone();
@@ -178,7 +178,7 @@ TEST(Filter, RelativeCovarianceMatchesManyRunsWithErrorsDrawnFromTheStartingCova
     for (int i = 0; i < kBase; ++i) error[i] = std::sqrt(start(i, i)) * random.normal();
     NavigationState state;
     state.retract(error);
-    Filter truth(FilterOptions{}, kLever);
+    Filter truth(FilterOptions{}, kAntenna);
     truth.start(state, loose_covariance());
     fly(truth, 0.2);
     const int index = truth.clone();

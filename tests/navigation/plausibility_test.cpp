@@ -1,4 +1,4 @@
-#include "pade/navigation/plausibility.hpp"
+#include "pade/navigation/plausibility/plausibility.hpp"
 
 #include <algorithm>
 #include <numbers>
@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pade/navigation/force_match.hpp"
+#include "pade/navigation/plausibility/force_match.hpp"
 #include "pade/navigation/replay.hpp"
 
 #include "navigation/flight.hpp"

@@ -12,7 +12,9 @@
 #include <gtest/gtest.h>
 
 #include "pade/io/navigation/navigation_log.hpp"
-#include "pade/pipeline/navigation_run.hpp"
+#include "pade/navigation/navigation_run.hpp"
+#include "pade/pipeline/poses_from_sensors.hpp"
+#include "pade/report/navigation_report.hpp"
 #include "pade/simulation/flight/flight.hpp"
 #include "pade/simulation/flight/sensor_files.hpp"
 
@@ -48,16 +50,18 @@ TEST_P(ShippedFlights, GiveHonestMotionBetweenFramesFromTheirFirstSeconds) {
     for (int k = 0; k < flight->frames; ++k) {
       options.frames.push_back(Time::from_seconds(flight->first_frame + k / flight->frame_rate));
     }
-    const auto run = run_navigation(log_of(*flight, seed), options);
-    ASSERT_TRUE(run.score) << "seed " << seed;
+    const NavigationLog log = log_of(*flight, seed);
+    const NavigationRun run = run_navigation(log, options);
+    const auto score = score_motions(log, options, run);
+    ASSERT_TRUE(score) << "seed " << seed;
     covered.push_back(static_cast<double>(run.frames.size()) / flight->frames);
-    t95.push_back(100 * run.score->translation_95);
-    direction_95.push_back(run.score->direction_95 * 180 / std::numbers::pi);
-    rotation_95.push_back(run.score->rotation_95 * 180 / std::numbers::pi);
-    nees.push_back(run.score->nees_mean);
-    rotation_nees.push_back(run.score->rotation_nees_mean);
-    direction_nees.push_back(run.score->direction_nees_mean);
-    length_nees.push_back(run.score->length_nees_mean);
+    t95.push_back(100 * score->translation_95);
+    direction_95.push_back(score->direction_95 * 180 / std::numbers::pi);
+    rotation_95.push_back(score->rotation_95 * 180 / std::numbers::pi);
+    nees.push_back(score->nees_mean);
+    rotation_nees.push_back(score->rotation_nees_mean);
+    direction_nees.push_back(score->direction_nees_mean);
+    length_nees.push_back(score->length_nees_mean);
   }
   const auto middle = [](const std::vector<double>& v) { return evaluation::quantile(v, 0.5); };
   const auto most = [](const std::vector<double>& v) { return evaluation::quantile(v, 1); };

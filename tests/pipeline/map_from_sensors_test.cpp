@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "pade/pipeline/map_sequence.hpp"
-#include "pade/pipeline/navigation_run.hpp"
+#include "pade/pipeline/poses_from_sensors.hpp"
 #include "pade/simulation/flight/simulated_sequence.hpp"
 
 namespace pade {

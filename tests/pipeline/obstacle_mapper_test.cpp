@@ -347,7 +347,6 @@ TEST(ObstacleMapper, RefusesWhatMakesNoSenseByName) {
            {"refinement.pixels", [](auto& o) { o.refinement.pixels = -5; }},
            {"edges.radius", [](auto& o) { o.edges.radius = 1000000; }},
            {"edges.nearness", [&](auto& o) { o.edges.nearness = nan; }},
-           {"edges.hole", [](auto& o) { o.edges.hole = -1; }},
            {"bound_sigmas", [&](auto& o) { o.depth.bound_sigmas = nan; }},
            {"flow_sigma_scale", [](auto& o) { o.depth.flow_sigma_scale = -1; }},
            {"flow_relative_sigma", [](auto& o) { o.depth.flow_relative_sigma = -1; }}}) {

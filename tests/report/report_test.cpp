@@ -58,7 +58,7 @@ Report some_report() {
   return report;
 }
 
-std::size_t count(const std::string& text, const std::string& part) {
+std::size_t occurrences(const std::string& text, const std::string& part) {
   std::size_t found = 0;
   for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
   return found;
@@ -80,8 +80,8 @@ TEST(Report, ClosesEveryElementItOpens) {
   const std::string html = to_html(some_report());
   for (const std::string element :
        {"div", "table", "tr", "td", "th", "svg", "figure", "figcaption", "p", "span", "h2", "text"}) {
-    EXPECT_EQ(count(html, "<" + element + ">") + count(html, "<" + element + " "),
-              count(html, "</" + element + ">"))
+    EXPECT_EQ(occurrences(html, "<" + element + ">") + occurrences(html, "<" + element + " "),
+              occurrences(html, "</" + element + ">"))
         << element;
   }
 }

@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "pade/io/run/run_writer.hpp"
-#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include "evaluation/synthetic_depth.hpp"
 #include "support/temporary_folder.hpp"

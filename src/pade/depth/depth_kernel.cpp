@@ -146,9 +146,8 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
     why = in_front ? why : kInconsistent;
     why = parallax ? why : low;
     why = across_ok ? why : kInconsistent;
+    why = (wx == wx) & (wy == wy) & (sigma2 < 1e6F) ? why : kInconsistent;
     why = inside ? why : kOutOfView;
-    why = (wx == wx) & (wy == wy) ? why : kInconsistent;
-    why = sigma2 < 1e6F ? why : kNoTexture;
     why = gate[i] == kNoTexture ? kNoTexture : why;
     why = aa >= k.blind2 ? why : low;
     why = gate[i] == kOutOfView ? kOutOfView : why;

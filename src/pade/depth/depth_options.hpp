@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
 
 namespace pade::depth {
 
@@ -54,7 +55,7 @@ struct DepthOptions {
   double residual_angle = 0.25;
   double texture_gate = 3;
   double texture_correlation = 0.5;
-  double bound_sigmas = 3.5;
+  double bound_sigmas = 3.6;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -72,6 +73,7 @@ struct DepthOptions {
           "further standard deviation of the flow, as share of the derotated flow");
     field("nearest", self.nearest,
           "nearest depth of interest, m: where even this has no parallax is the epipole");
+    field("far", self.far, "depth, m, that must have a parallax outside the epipole");
     field("parallax_gate", self.parallax_gate, "parallax below this many flow sigmas is low parallax");
     field(
         "residual_gate", self.residual_gate,
@@ -87,6 +89,9 @@ struct DepthOptions {
     field("bound_sigmas", self.bound_sigmas, "k: sigmas that the lower bound keeps from what was measured");
   }
 };
+
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const DepthOptions& options);
 
 /// What the chain uses: sigma as calibrated on the half-size flow of CLG (docs/method.md, "Variance").
 inline DepthOptions chain_options() {

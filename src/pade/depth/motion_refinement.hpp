@@ -12,6 +12,7 @@
 #include "pade/core/flow_field.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/core/result.hpp"
 
 namespace pade::depth {
 
@@ -40,6 +41,8 @@ struct MotionRefinementOptions {
           "the same of the refined direction of translation, per axis");
   }
 };
+
+Status check(const MotionRefinementOptions& options);
 
 /// What became of the prior.
 enum class RefinementOutcome {

@@ -90,7 +90,7 @@ double corrected_share(double z, double bias, double acceleration) {
 }
 
 // The draw that a share of them stays below.
-double quantile(const std::vector<double>& sorted, double share) {
+double quantile_of_sorted(const std::vector<double>& sorted, double share) {
   const double rank = share * static_cast<double>(sorted.size()) - 0.5;
   const double last = static_cast<double>(sorted.size() - 1);
   return sorted[static_cast<std::size_t>(std::lround(std::clamp(rank, 0.0, last)))];
@@ -118,8 +118,8 @@ Interval bootstrap_mean(std::span<const double> per_sequence, double level, std:
   double bias = bias_of(means, interval.estimate);
   double acceleration = acceleration_of(values, interval.estimate);
   if (!std::isfinite(acceleration) || std::abs(bias) > 39) bias = acceleration = 0;  // percentiles
-  interval.low = quantile(means, corrected_share(-z, bias, acceleration));
-  interval.high = quantile(means, corrected_share(z, bias, acceleration));
+  interval.low = quantile_of_sorted(means, corrected_share(-z, bias, acceleration));
+  interval.high = quantile_of_sorted(means, corrected_share(z, bias, acceleration));
   return interval;
 }
 

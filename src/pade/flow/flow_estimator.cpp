@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "pade/core/option_check.hpp"
 #include "pade/flow/methods/clg.hpp"
 #include "pade/flow/methods/farneback.hpp"
 #include "pade/flow/methods/lucas_kanade.hpp"
@@ -89,8 +90,18 @@ const std::vector<std::string>& flow_estimator_names() {
   return names;
 }
 
+Status check(const FlowOptions& o) {
+  const OptionRange ranges[] = {
+      {"smallest_level", static_cast<double>(o.smallest_level), 1, 65536},
+      {"initial_level", static_cast<double>(o.initial_level), -1, 16},
+      {"threads", static_cast<double>(o.threads), 1, 256},
+  };
+  return check_ranges(ranges);
+}
+
 Result<std::unique_ptr<FlowEstimator>> make_flow_estimator(std::string_view name,
                                                            const FlowOptions& options) {
+  if (const Status status = check(options); !status) return status.error();
   if (name == "dis") name = "dis-medium";
   std::string known;
   for (const auto& [candidate, factory] : registry()) {

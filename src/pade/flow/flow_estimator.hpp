@@ -37,30 +37,21 @@ enum class InitialFlow {
 
 /// Options of all our own methods.
 struct FlowOptions {
-  int smallest_level = 8;
-  bool half_resolution = false;
-  FlowConfidence confidence = FlowConfidence::none;
-  int initial_level = 16;
-  InitialFlow initial = InitialFlow::replaces;
-  int threads = 1;
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& field) {
-    field("smallest_level", self.smallest_level,
-          "shorter side of the coarsest pyramid level, pixels, at least");
-    field("half_resolution", self.half_resolution,
-          "stop at half the size and interpolate: about a quarter of the time, blunter edges");
-    field("confidence", self.confidence,
-          "source of the standard deviations: none, local or forward_backward");
-    field("initial_level", self.initial_level,
-          "coarsest pyramid level at which a given initial flow is taken up, 0 = full size: a good one, "
-          "taken up "
-          "on a fine level, finds thin things that move farther than they are wide");
-    field("initial", self.initial,
-          "replaces | competes: whether coarser levels are left out, or what they find is compared with it");
-    field("threads", self.threads, "threads for one pair; the result does not depend on it");
-  }
+  int smallest_level = 8;  ///< shorter side of the coarsest pyramid level, pixels, at least
+  bool half_resolution =
+      false;  ///< stop at half the size and interpolate: about a quarter of the time, blunter edges
+  FlowConfidence confidence =
+      FlowConfidence::none;  ///< source of the standard deviations: none, local or forward_backward
+  int initial_level =
+      16;  ///< coarsest pyramid level at which a given initial flow is taken up, 0 = full size: a good one,
+           ///< taken up on a fine level, finds thin things that move farther than they are wide
+  InitialFlow initial = InitialFlow::replaces;  ///< replaces | competes: whether coarser levels are left out,
+                                                ///< or what they find is compared with it
+  int threads = 1;                              ///< threads for one pair; the result does not depend on it
 };
+
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const FlowOptions& options);
 
 /// Dense optical flow between two images of one size. An object keeps buffers between calls: use one per
 /// thread.

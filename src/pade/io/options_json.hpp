@@ -2,6 +2,7 @@
 // files, by one list of fields.
 #pragma once
 
+#include <concepts>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -67,16 +68,27 @@ std::string to_json(const Options& options, int indent = -1) {
   return to_json(option_fields(copy), indent);
 }
 
+/// Options that know what makes no sense (core/option_check.hpp).
+template <class Options>
+concept CheckedOptions = OptionStruct<Options> && requires(const Options& options) {
+  { check(options) } -> std::same_as<Status>;
+};
+
 /// Sets the fields that a YAML (or JSON) mapping names; the others keep their values. Refused, with nothing
-/// changed: text that is not a mapping, an unknown field, a value of another type. `file` is what messages
-/// call the text.
+/// changed: text that is not a mapping, an unknown field, a value of another type, and, of an options struct,
+/// a number that its check() refuses. `file` is what messages call the text.
 Status from_yaml(std::string_view text, std::string_view file, const OptionFields& fields);
 template <OptionStruct Options>
 Status from_yaml(std::string_view text, std::string_view file, Options& options) {
   Options copy = options;
-  Status status = from_yaml(text, file, option_fields(copy));
-  if (status) options = std::move(copy);
-  return status;
+  if (Status status = from_yaml(text, file, option_fields(copy)); !status) return status;
+  if constexpr (CheckedOptions<Options>) {
+    if (Status status = check(copy); !status) {
+      return Error{std::string(file) + ": " + status.error().message};
+    }
+  }
+  options = std::move(copy);
+  return {};
 }
 
 }  // namespace pade::io

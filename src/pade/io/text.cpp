@@ -28,6 +28,12 @@ bool path_exists(const std::filesystem::path& path) {
   return std::filesystem::exists(path, failure);
 }
 
+std::filesystem::path absolute_path(const std::filesystem::path& path) {
+  std::error_code failure;
+  std::filesystem::path whole = std::filesystem::absolute(path, failure);
+  return failure ? path : whole;
+}
+
 Result<std::string> read_file(const std::filesystem::path& file) {
   std::error_code failure;
   const auto status = std::filesystem::status(file, failure);

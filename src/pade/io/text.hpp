@@ -15,6 +15,9 @@ namespace pade::io {
 /// Whether there is something of this name; false also where that cannot be found out.
 bool path_exists(const std::filesystem::path& path);
 
+/// The path from the root; `path` as it is where the working folder cannot be found out.
+std::filesystem::path absolute_path(const std::filesystem::path& path);
+
 /// The content of a file, text or not. Refused where it is missing, a folder, unreadable, or longer than 1
 /// GiB.
 Result<std::string> read_file(const std::filesystem::path& file);

@@ -90,7 +90,7 @@ void Clearance::set(const DepthImage& image, const Camera& camera, const Pose& T
   }
   // A window that straddles an edge has a depth between the two surfaces: its neighbours know the nearer one.
   if (image.window > 1) nearest_of_neighbours(ends_, scratch_, width, height);
-  close_holes(width, height);
+  close_holes(image.depth);
   drop_lone_ends(width, height);
   build_pyramid(width, height);
 
@@ -115,17 +115,17 @@ std::int32_t Clearance::hole_of(std::int32_t run) {
   return run;
 }
 
-/// Rows of unknown cells, each joined to those of the row above that it touches.
-void Clearance::find_runs(int width, int height) {
+/// Rows of cells that end before `end`, each joined to those of the row above that it touches.
+void Clearance::find_runs(float end, int width, int height) {
   runs_.clear();
   std::size_t above = 0;  // the first run of the row above that may touch
   for (int v = 0; v < height; ++v) {
     const std::size_t begin = runs_.size();
     const float* row = &ends_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width)];
     for (int u = 0; u < width; ++u) {
-      if (!std::isnan(row[u])) continue;
+      if (row[u] >= end) continue;
       const int first = u;
-      while (u < width && std::isnan(row[u])) ++u;
+      while (u < width && !(row[u] >= end)) ++u;
       const auto run = static_cast<std::int32_t>(runs_.size());
       runs_.push_back({v, first, u - 1, run});
       while (above < begin && (runs_[above].row < v - 1 || runs_[above].last + 1 < first)) ++above;
@@ -139,47 +139,46 @@ void Clearance::find_runs(int width, int height) {
   }
 }
 
-float Clearance::nearest_around(const Run& run, int width, int height) const {
-  float nearest = kInfinity;
-  for (int v = std::max(run.row - 1, 0); v <= std::min(run.row + 1, height - 1); ++v) {
-    const float* row = &ends_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width)];
-    for (int u = std::max(run.first - 1, 0); u <= std::min(run.last + 1, width - 1); ++u) {
-      if (row[u] < nearest) nearest = row[u];
-    }
+/// The spots that the runs make up: their extent, and whether one of their cells has measured something
+/// before `end`.
+void Clearance::find_holes(const cv::Mat& depth, float end) {
+  holes_.assign(runs_.size(), {depth.cols, 0, depth.rows, 0, false});
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+    const auto* row = depth.ptr<float>(run.row);
+    const bool sees = std::any_of(row + run.first, row + run.last + 1, [&](float z) { return z < end; });
+    hole = {std::min(hole.left, run.first), std::max(hole.right, run.last), std::min(hole.top, run.row),
+            std::max(hole.bottom, run.row), hole.sees_obstacle || sees};
   }
-  return nearest;
 }
 
-/// A hole of n cells hides nothing larger than n Z / f at depth Z. Up to where that is `hole`, and to the
-/// nearest end around it, it counts as free; a hole at the border of the image may go on beyond it.
-void Clearance::close_holes(int width, int height) {
-  find_runs(width, height);
-  holes_.assign(runs_.size(), {width, 0, height, 0, kInfinity});
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
-    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
-    hole = {std::min(hole.left, run.first), std::max(hole.right, run.last), std::min(hole.top, run.row),
-            std::max(hole.bottom, run.row), hole.nearest};
-  }
+/// A spot of n cells hides nothing larger than n Z / f at depth Z. Up to where that is `hole` it counts as
+/// free where all cells around it are and none of its own has measured anything there; a spot at the border
+/// of the image may go on beyond it.
+void Clearance::close_holes(const cv::Mat& depth) {
+  constexpr double kNearest = 0.3;  // m: what ends before is not worth the search
+  constexpr double kStep = 1.3;     // from size to size
+  const int width = depth.cols;
+  const int height = depth.rows;
   const double reach = parameters_.hole * std::min(camera_.fx, camera_.fy);
-  const auto free_to = [&](const Hole& hole) {
-    if (hole.left == 0 || hole.top == 0 || hole.right == width - 1 || hole.bottom == height - 1) return 0.0F;
-    const int size = std::max(hole.right - hole.left, hole.bottom - hole.top) + 1;
-    return static_cast<float>(reach / size);
-  };
-  constexpr float kTooNear = 0.2F;  // m: not worth the search around a large hole
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
-    if (free_to(hole) > kTooNear)
-      hole.nearest = std::min(hole.nearest, nearest_around(runs_[i], width, height));
+  for (double size = reach / kNearest; size >= 1; size /= kStep) {
+    const auto end = static_cast<float>(std::min(reach / std::floor(size), parameters_.range));
+    find_runs(end, width, height);
+    find_holes(depth, end);
+    const int largest = static_cast<int>(size) - 1;
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      const Run& run = runs_[i];
+      const Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
+      const bool closed = hole.left > 0 && hole.top > 0 && hole.right < width - 1 &&
+                          hole.bottom < height - 1 && hole.right - hole.left <= largest &&
+                          hole.bottom - hole.top <= largest && !hole.sees_obstacle;
+      if (!closed) continue;
+      float* row = &ends_[static_cast<std::size_t>(run.row) * static_cast<std::size_t>(width)];
+      std::fill(row + run.first, row + run.last + 1, end);
+    }
   }
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
-    const Hole& hole = holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))];
-    const float end = free_to(hole) > kTooNear ? std::min(free_to(hole), hole.nearest) : 0.0F;
-    float* row = &ends_[static_cast<std::size_t>(run.row) * static_cast<std::size_t>(width)];
-    std::fill(row + run.first, row + run.last + 1, end);
-  }
+  for (float& end : ends_) end = end >= 0 ? end : 0;
 }
 
 /// Where every voxel within range covers 3 x 3 cells or more, a far end that no 3 x 3 cells around it share

@@ -27,7 +27,7 @@ class Clearance {
   struct Parameters {
     double range = 20;         ///< m along the optical axis
     double margin_sigmas = 2;  ///< k
-    double hole = 0.05;        ///< a thing that is smaller than this is not looked for in unknown pixels, m
+    double hole = 0.05;        ///< a thing that is smaller than this is not looked for, m
     double voxel = 0.1;        ///< side of the smallest cube that look_at() will be asked about, m
   };
 
@@ -58,7 +58,7 @@ class Clearance {
     int height = 0;
     std::vector<Extremes> cells;
   };
-  /// Neighbouring cells of a row that know nothing.
+  /// Neighbouring cells of a row that end before the same depth.
   struct Run {
     int row, first, last;
     std::int32_t hole;  // index of the run that stands for its hole: itself, or an earlier one
@@ -66,12 +66,12 @@ class Clearance {
   /// Runs that touch, also at corners.
   struct Hole {
     int left, right, top, bottom;
-    float nearest;  // end of the cells around it
+    bool sees_obstacle;
   };
-  void close_holes(int width, int height);
-  void find_runs(int width, int height);
+  void close_holes(const cv::Mat& depth);
+  void find_holes(const cv::Mat& depth, float end);
+  void find_runs(float end, int width, int height);
   [[nodiscard]] std::int32_t hole_of(std::int32_t run);
-  [[nodiscard]] float nearest_around(const Run& run, int width, int height) const;
   void drop_lone_ends(int width, int height);
   void build_pyramid(int width, int height);
   [[nodiscard]] Extremes over(int u0, int v0, int u1, int v1) const;

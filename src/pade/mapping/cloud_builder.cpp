@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "pade/core/option_check.hpp"
 #include "pade/mapping/back_projection.hpp"
 
 namespace pade::mapping {
@@ -20,6 +21,15 @@ std::uint64_t cube_of(const CloudPoint& point, double spacing) {
 }
 
 }  // namespace
+
+Status check(const CloudOptions& o) {
+  const OptionRange ranges[] = {
+      {"spacing", o.spacing, 0.001, 1000},
+      {"largest_relative_sigma", o.largest_relative_sigma, 0},
+      {"step", static_cast<double>(o.step), 1, 65536},
+  };
+  return check_ranges(ranges);
+}
 
 void CloudBuilder::add(const DepthImage& image, const Camera& camera, const Pose& T_world_camera,
                        const cv::Mat& intensity) {

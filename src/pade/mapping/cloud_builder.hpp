@@ -9,6 +9,7 @@
 #include "pade/core/options.hpp"
 #include "pade/core/point_cloud.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/core/result.hpp"
 
 namespace pade::mapping {
 
@@ -26,10 +27,14 @@ struct CloudOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const CloudOptions& options);
+
 /// Keeps, of each small cube of space, the point with the least sigma. The order is that in which cubes were
 /// first seen, so that the same images give the same cloud.
 class CloudBuilder {
  public:
+  /// @param options  that check() accepts
   explicit CloudBuilder(const CloudOptions& options = {}) : options_(options) {}
 
   /// Arguments as of back_project().

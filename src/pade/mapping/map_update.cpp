@@ -136,7 +136,8 @@ octomap::OcTreeKey morton_key(std::uint64_t code) {
 
 MapCell cell_of(std::uint64_t code, unsigned depth, double voxel) {
   MapCell cell;
-  cell.key = morton_key(code);
+  const octomap::OcTreeKey key = morton_key(code);
+  cell.key = {key[0], key[1], key[2]};
   cell.depth = depth;
   const double voxels = static_cast<double>(1U << (kTreeDepth - depth));
   for (unsigned axis = 0; axis < 3; ++axis) {

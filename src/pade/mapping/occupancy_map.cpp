@@ -8,6 +8,8 @@
 #include <string>
 #include <utility>
 
+#include <octomap/OcTree.h>
+
 #include "pade/mapping/back_projection.hpp"
 #include "pade/mapping/clearance.hpp"
 #include "pade/mapping/map_update.hpp"
@@ -58,36 +60,6 @@ Error out_of_range(const char* option, double value, const std::string& expected
   return Error{"option " + std::string(option) + " is " + std::to_string(value) + ", expected " + expected};
 }
 
-Status check(const MapOptions& o) {
-  const auto finite_positive = [](double value) { return value > 0 && std::isfinite(value); };
-  if (!(o.voxel >= 0.001 && o.voxel <= 100)) return out_of_range("voxel", o.voxel, "0.001 to 100 m");
-  if (!finite_positive(o.range)) return out_of_range("range", o.range, "a positive number of metres");
-  if (!(o.p_hit > 0.5 && o.p_hit < 1)) return out_of_range("p_hit", o.p_hit, "above 0.5 and below 1");
-  if (!(o.p_miss > 0 && o.p_miss < 0.5)) return out_of_range("p_miss", o.p_miss, "above 0 and below 0.5");
-  if (!(o.clamp_min > 0 && o.clamp_min < o.clamp_max)) {
-    return out_of_range("clamp_min", o.clamp_min, "above 0 and below clamp_max");
-  }
-  if (!(o.clamp_max < 1)) return out_of_range("clamp_max", o.clamp_max, "below 1");
-  if (!(o.occupancy_threshold > o.clamp_min && o.occupancy_threshold < o.clamp_max)) {
-    return out_of_range("occupancy_threshold", o.occupancy_threshold, "between clamp_min and clamp_max");
-  }
-  if (!(o.free_margin_sigmas >= 0))
-    return out_of_range("free_margin_sigmas", o.free_margin_sigmas, "at least 0");
-  if (!(o.free_hole >= 0)) return out_of_range("free_hole", o.free_hole, "at least 0");
-  if (!(o.looks_baseline >= 0)) return out_of_range("looks_baseline", o.looks_baseline, "at least 0");
-  if (!(o.hit_max_relative_sigma >= 0 && o.hit_max_relative_sigma <= 0.5)) {
-    return out_of_range("hit_max_relative_sigma", o.hit_max_relative_sigma, "0 to 0.5");
-  }
-  if (!(o.hit_near >= 0)) return out_of_range("hit_near", o.hit_near, "at least 0");
-  if (!(o.hit_min_share >= 0 && o.hit_min_share <= 1)) {
-    return out_of_range("hit_min_share", o.hit_min_share, "0 to 1");
-  }
-  if (!(o.hit_min_of_peak >= 0 && o.hit_min_of_peak <= 1)) {
-    return out_of_range("hit_min_of_peak", o.hit_min_of_peak, "0 to 1");
-  }
-  return {};
-}
-
 /// Key of the voxel that holds a point, by the arithmetic of OctoMap's coordToKey. `per_voxel` = 1 / voxel.
 bool to_key(const Eigen::Vector3d& point, double per_voxel, octomap::OcTreeKey& key) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -127,6 +99,38 @@ bool is_placed(const PendingHits::Evidence& evidence) {
 }
 
 }  // namespace
+
+Status check(const MapOptions& o) {
+  const auto finite_positive = [](double value) { return value > 0 && std::isfinite(value); };
+  if (!(o.voxel >= 0.001 && o.voxel <= 100)) return out_of_range("voxel", o.voxel, "0.001 to 100 m");
+  if (!finite_positive(o.range)) return out_of_range("range", o.range, "a positive number of metres");
+  if (!(o.p_hit > 0.5 && o.p_hit < 1)) return out_of_range("p_hit", o.p_hit, "above 0.5 and below 1");
+  if (!(o.p_miss > 0 && o.p_miss < 0.5)) return out_of_range("p_miss", o.p_miss, "above 0 and below 0.5");
+  if (!(o.clamp_max > 0 && o.clamp_max < 1)) {
+    return out_of_range("clamp_max", o.clamp_max, "above 0 and below 1");
+  }
+  if (!(o.clamp_min > 0 && o.clamp_min < o.clamp_max)) {
+    return out_of_range("clamp_min", o.clamp_min, "above 0 and below clamp_max");
+  }
+  if (!(o.occupancy_threshold > o.clamp_min && o.occupancy_threshold < o.clamp_max)) {
+    return out_of_range("occupancy_threshold", o.occupancy_threshold, "between clamp_min and clamp_max");
+  }
+  if (!(o.free_margin_sigmas >= 0))
+    return out_of_range("free_margin_sigmas", o.free_margin_sigmas, "at least 0");
+  if (!(o.free_hole >= 0)) return out_of_range("free_hole", o.free_hole, "at least 0");
+  if (!(o.looks_baseline >= 0)) return out_of_range("looks_baseline", o.looks_baseline, "at least 0");
+  if (!(o.hit_max_relative_sigma >= 0 && o.hit_max_relative_sigma <= 0.5)) {
+    return out_of_range("hit_max_relative_sigma", o.hit_max_relative_sigma, "0 to 0.5");
+  }
+  if (!(o.hit_near >= 0)) return out_of_range("hit_near", o.hit_near, "at least 0");
+  if (!(o.hit_min_share >= 0 && o.hit_min_share <= 1)) {
+    return out_of_range("hit_min_share", o.hit_min_share, "0 to 1");
+  }
+  if (!(o.hit_min_of_peak >= 0 && o.hit_min_of_peak <= 1)) {
+    return out_of_range("hit_min_of_peak", o.hit_min_of_peak, "0 to 1");
+  }
+  return {};
+}
 
 OccupancyMap::OccupancyMap(const MapOptions& options)
     : options_(options), tree_(std::make_unique<Tree>(options.voxel)), scratch_(std::make_unique<Scratch>()) {

@@ -3,6 +3,8 @@
 // docs/mapping.md.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,13 +12,18 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <octomap/OcTree.h>
 
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
+
+// OctoMap's headers cost more than all of this one: whoever uses tree() includes <octomap/OcTree.h>.
+namespace octomap {
+class OcTree;
+class OcTreeNode;
+}  // namespace octomap
 
 namespace pade::mapping {
 
@@ -30,7 +37,7 @@ struct MapOptions {
   double clamp_max = 0.971;
   double occupancy_threshold = 0.5;  ///< occupied at and above
   double free_margin_sigmas = 2;     ///< a ray is free up to Z - this many sigma
-  double free_hole = 0.05;           ///< what is smaller is not looked for in pixels that know nothing, m
+  double free_hole = 0.1;            ///< what is smaller is not looked for, m
   double looks_baseline = 0.1;  ///< between the places of the two looks that make a voxel free, and of those
                                 ///< that confirm a far or uncertain hit, m; 0 = one look is enough
   double hit_max_relative_sigma = 0.25;  ///< depths with sigma above this share of Z place no obstacle
@@ -49,7 +56,7 @@ struct MapOptions {
     field("occupancy_threshold", self.occupancy_threshold, "a voxel is occupied at and above");
     field("free_margin_sigmas", self.free_margin_sigmas, "k: a ray is free up to Z - k sigma");
     field("free_hole", self.free_hole,
-          "what is smaller than this is not looked for in pixels that know nothing, m");
+          "spots of short or unknown sight that hide nothing larger than this count as free, m; 0 = none");
     field("looks_baseline", self.looks_baseline,
           "between two looks that make a voxel free or confirm a far or uncertain hit, m; 0 = one look is "
           "enough");
@@ -61,16 +68,19 @@ struct MapOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const MapOptions& options);
+
 inline constexpr unsigned kTreeDepth = 16;
 
 enum class Occupancy : std::uint8_t { unknown, free, occupied };
 
 /// A voxel, or a cube of 2^k voxels to a side that all have the same state.
 struct MapCell {
-  octomap::OcTreeKey key;  ///< of the voxel at the lower corner of the cube
-  unsigned depth = 16;     ///< in the octree; 16 = one voxel
-  Eigen::Vector3f centre;  ///< world, m
-  float side = 0;          ///< m
+  std::array<std::uint16_t, 3> key{};  ///< OctoMap's, of the voxel at the lower corner of the cube
+  unsigned depth = 16;                 ///< in the octree; 16 = one voxel
+  Eigen::Vector3f centre;              ///< world, m
+  float side = 0;                      ///< m
 };
 
 /// What one depth image changed. In order of position (Morton order), each place once.
@@ -108,8 +118,8 @@ class OccupancyMap {
   /// looks from other places agree.
   /// - Miss: every pixel that sees the voxel has its bound (or, in an image without bounds, Z - k sigma)
   /// behind the whole voxel, in this image and in one of the last few from at least looks_baseline away.
-  /// Pixels that know nothing leave what lies behind them unknown, but for holes that are smaller than
-  /// free_hole there.
+  /// Pixels that know nothing, or see less far, leave what lies behind them unknown, but for spots whose size
+  /// is below free_hole there.
   /// @param image           variance empty = depth is exact; own_variance empty = variance; state empty =
   /// measured wherever there is depth; bound empty = Z - k sigma of measured pixels
   /// @param camera          pinhole of the image at full size (its distortion is ignored)

@@ -30,19 +30,6 @@ Vector3d noise_power(double density, double share, const Vector3d& variance, dou
 
 }  // namespace
 
-FilterOptions FilterOptions::of(ImuClass imu) {
-  FilterOptions options;
-  if (imu == ImuClass::consumer) {
-    options.gyroscope_noise = 1e-4;
-    options.gyroscope_vibration = 0.2;
-    options.accelerometer_vibration = 0.35;
-    options.gyroscope_bias_walk = 3e-5;
-    options.accelerometer_bias_walk = 1e-3;
-    options.accelerometer_bias_sigma = 0.3;
-  }
-  return options;
-}
-
 void Vibration::observe(const ImuSample& sample, double longest_interval) {
   const double dt = seconds_between(last.time, sample.time);
   if (samples > 0 && (dt <= 0 || dt > longest_interval)) samples = 0;

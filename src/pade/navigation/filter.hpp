@@ -12,32 +12,13 @@
 #include "pade/navigation/filter_options.hpp"
 #include "pade/navigation/filter_state.hpp"
 #include "pade/navigation/imu_increment.hpp"
+#include "pade/navigation/measurement.hpp"
 #include "pade/navigation/measurement_models.hpp"
 
 namespace pade::navigation {
 
 inline constexpr int kMaxClones = 10;
 inline constexpr int kMaxState = kBase + 6 * kMaxClones;
-
-/// What became of a measurement.
-enum class Verdict : std::uint8_t {
-  accepted,
-  inflated,    ///< outside the gate, used with its noise enlarged so that it lies on the gate
-  rejected,    ///< far outside
-  reacquired,  ///< after a time of nothing but rejections: the state was opened for it and moved
-  unusable,    ///< not finite, or without meaning in this state
-};
-
-/// Innovation of one measurement; unused components are zero.
-struct Innovation {
-  Verdict verdict = Verdict::unusable;
-  int size = 0;
-  Vector3d residual = Vector3d::Zero();
-  Vector3d sigma = Vector3d::Zero();  ///< predicted, before any inflation
-  double chi_square = 0;
-  double log_likelihood = 0;  ///< of the residual under its predicted covariance, without the constant
-  double jump = 0;  ///< distance the position (or speed the velocity) moved in a re-acquisition, m or m/s
-};
 
 /// Split of a reported GNSS position error into white noise and Gauss-Markov bias.
 struct GnssErrorClass {

@@ -1,4 +1,4 @@
-// The constants of the filter: one set per class of sensor, never per recording.
+// The constants of the filter and of its start: one set per class of sensor, never per recording.
 #pragma once
 
 #include <array>
@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
 
 namespace pade::navigation {
 
@@ -95,6 +96,38 @@ struct FilterOptions {
     field("reacquire_after", self.reacquire_after, "seconds of rejections before a sensor is believed again");
   }
 };
+
+/// Of the start (alignment.hpp).
+struct AlignmentOptions {
+  double level_time = 2.0;              ///< seconds of rest for levelling
+  double rest_rate_sigma = 0.02;        ///< spread of the angular rate that counts as rest, rad/s
+  double rest_force_sigma = 0.7;        ///< spread of the specific force that counts as rest, m/s²
+  double rest_speed = 0.3;              ///< GNSS speed that does not contradict rest, m/s
+  double motion_window = 1.0;           ///< baseline of the first GNSS velocities of a start in motion, s
+  double heading_sigma_magnetic = 0.3;  ///< of a start at a magnetometer's yaw, which updates narrow, rad
+  int hypotheses = 12;                  ///< yaws of the bank
+  double yaw_known = 0.15;              ///< spread of the bank's yaw at which the best filter is taken, rad
+  double lag = 0.4;                     ///< the bank waits this long for late data, s
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("level_time", self.level_time, "seconds of rest for levelling");
+    field("rest_rate_sigma", self.rest_rate_sigma, "spread of the angular rate that counts as rest, rad/s");
+    field("rest_force_sigma", self.rest_force_sigma,
+          "spread of the specific force that counts as rest, m/s²");
+    field("rest_speed", self.rest_speed, "GNSS speed that does not contradict rest, m/s");
+    field("motion_window", self.motion_window,
+          "baseline of the first GNSS velocities of a start in motion, s");
+    field("heading_sigma_magnetic", self.heading_sigma_magnetic, "of a magnetometer's first yaw, rad");
+    field("hypotheses", self.hypotheses, "yaws of the bank");
+    field("yaw_known", self.yaw_known, "spread of the bank's yaw at which the best filter is taken, rad");
+    field("lag", self.lag, "the start waits this long for late data, s");
+  }
+};
+
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const FilterOptions& options);
+Status check(const AlignmentOptions& options);
 
 }  // namespace pade::navigation
 

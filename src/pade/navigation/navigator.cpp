@@ -2,6 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "pade/core/option_check.hpp"
+#include "pade/navigation/alignment.hpp"
+#include "pade/navigation/timeline.hpp"
 
 namespace pade::navigation {
 namespace {
@@ -41,7 +48,46 @@ double buffered_seconds(const NavigatorOptions& options) {
 
 }  // namespace
 
-Navigator::Navigator(const NavigatorOptions& options)
+class Navigator::Core {
+ public:
+  explicit Core(const NavigatorOptions& options);
+
+  void add(const ImuSample& sample);
+  void add(Measurement measurement, double latency, bool finite);
+  RelativePose relative_pose(Time t1, Time t2, const Pose& T_body_camera);
+  AbsolutePose absolute_pose(Time t);
+  Health health();
+  [[nodiscard]] const NavigatorOptions& options() const { return options_; }
+  [[nodiscard]] Time newest() const { return newest_; }
+  void on_retired(std::function<void(const Measurement&)> sink) { sink_ = std::move(sink); }
+  void retire(Time before);
+
+ private:
+  struct Keyframe {
+    Time time;
+    FilterSnapshot snapshot;
+  };
+
+  void advance_live(Time to);
+  void restart();
+  bool load_scratch(Time t, Answer& answer);
+  [[nodiscard]] Time imu_time(Time image) const;
+  [[nodiscard]] NavigationStatus status_of(Filter& filter) const;
+
+  NavigatorOptions options_;
+  Timeline timeline_;
+  Alignment alignment_;
+  AlignmentPhase phase_ = AlignmentPhase::waiting;
+  Filter live_;
+  Filter scratch_;
+  TimeRing<Keyframe> keyframes_;
+  bool has_imu_ = false;
+  Time newest_;
+  Health health_;
+  std::function<void(const Measurement&)> sink_;
+};
+
+Navigator::Core::Core(const NavigatorOptions& options)
     : options_(options),
       timeline_(capacity(buffered_seconds(options), options.imu_rate),
                 capacity(buffered_seconds(options), 200)),
@@ -52,7 +98,7 @@ Navigator::Navigator(const NavigatorOptions& options)
   timeline_.declination = options.declination;
 }
 
-void Navigator::restart() {
+void Navigator::Core::restart() {
   phase_ = AlignmentPhase::waiting;
   alignment_.reset();
   keyframes_.clear();
@@ -60,7 +106,7 @@ void Navigator::restart() {
   ++health_.restarts;
 }
 
-void Navigator::add(const ImuSample& sample) {
+void Navigator::Core::add(const ImuSample& sample) {
   if (!sample.angular_rate.allFinite() || !sample.specific_force.allFinite() ||
       (has_imu_ && sample.time <= newest_)) {
     ++health_.imu_refused;
@@ -88,7 +134,7 @@ void Navigator::add(const ImuSample& sample) {
   retire(shifted(newest_, -buffered_seconds(options_) + 1));
 }
 
-void Navigator::advance_live(Time to) {
+void Navigator::Core::advance_live(Time to) {
   timeline_.advance(live_, to, true, [this] {
     const Time now = live_.state().time;
     if (seconds_between(keyframes_.back().time, now) >= kKeyframeInterval - 1e-9) {
@@ -97,7 +143,7 @@ void Navigator::advance_live(Time to) {
   });
 }
 
-void Navigator::add(Measurement measurement, double latency, bool finite) {
+void Navigator::Core::add(Measurement measurement, double latency, bool finite) {
   if (!finite) {
     ++health_.unusable;
     return;
@@ -120,50 +166,16 @@ void Navigator::add(Measurement measurement, double latency, bool finite) {
   advance_live(newest_);
 }
 
-void Navigator::add(const GnssFix& measurement) {
-  add(Measurement(measurement), options_.gnss_position_latency,
-      measurement.position.allFinite() && measurement.covariance.allFinite());
-}
-void Navigator::add(const GnssVelocity& measurement) {
-  add(Measurement(measurement), options_.gnss_velocity_latency,
-      measurement.velocity.allFinite() && measurement.covariance.allFinite());
-}
-void Navigator::add(const BarometricHeight& measurement) {
-  add(Measurement(measurement), options_.barometer_latency,
-      std::isfinite(measurement.height) && std::isfinite(measurement.sigma));
-}
-void Navigator::add(const Heading& measurement) {
-  add(Measurement(measurement), 0, std::isfinite(measurement.yaw) && std::isfinite(measurement.sigma));
-}
-void Navigator::add(const MagneticField& measurement) {
-  add(Measurement(measurement), options_.magnetometer_latency,
-      measurement.field.allFinite() && std::isfinite(measurement.sigma));
-}
-void Navigator::add(const ZeroVelocity& measurement) {
-  add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
-}
-void Navigator::add(const RangeToGround& measurement) {
-  add(Measurement(measurement), 0,
-      std::isfinite(measurement.range) && std::isfinite(measurement.sigma) &&
-          std::isfinite(measurement.ground_height));
-}
-
-void Navigator::add(const RoadMotion& measurement) {
-  add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
-}
-
-void Navigator::retire(Time before) {
+void Navigator::Core::retire(Time before) {
   while (!timeline_.measurements.empty() && timeline_.measurements.front().time < before) {
     if (sink_) sink_(timeline_.measurements.front());
     timeline_.measurements.pop_front();
   }
 }
 
-void Navigator::finish() { retire(Time{INT64_MAX}); }
+Time Navigator::Core::imu_time(Time image) const { return shifted(image, options_.camera_time_offset); }
 
-Time Navigator::imu_time(Time image) const { return shifted(image, options_.camera_time_offset); }
-
-bool Navigator::load_scratch(Time t, Answer& answer) {
+bool Navigator::Core::load_scratch(Time t, Answer& answer) {
   if (phase_ != AlignmentPhase::aligned) {
     answer = Answer::not_initialised;
   } else if (t > newest_) {
@@ -178,7 +190,7 @@ bool Navigator::load_scratch(Time t, Answer& answer) {
   return answer == Answer::valid;
 }
 
-NavigationStatus Navigator::status_of(Filter& filter) const {
+NavigationStatus Navigator::Core::status_of(Filter& filter) const {
   if (yaw_of(filter).sigma > kYawKnown) return NavigationStatus::levelled;
   const FilterCore& core = filter.core();
   if (!core.velocity_seen) return NavigationStatus::yaw_known;
@@ -187,7 +199,7 @@ NavigationStatus Navigator::status_of(Filter& filter) const {
                                                  : NavigationStatus::navigating;
 }
 
-RelativePose Navigator::relative_pose(Time t1, Time t2, const Pose& T_body_camera) {
+RelativePose Navigator::Core::relative_pose(Time t1, Time t2, const Pose& T_body_camera) {
   RelativePose result;
   t1 = imu_time(t1);
   t2 = imu_time(t2);
@@ -221,7 +233,7 @@ RelativePose Navigator::relative_pose(Time t1, Time t2, const Pose& T_body_camer
   return result;
 }
 
-AbsolutePose Navigator::absolute_pose(Time t) {
+AbsolutePose Navigator::Core::absolute_pose(Time t) {
   AbsolutePose result;
   if (!load_scratch(imu_time(t), result.answer)) return result;
   const NavigationState& state = scratch_.state();
@@ -235,7 +247,7 @@ AbsolutePose Navigator::absolute_pose(Time t) {
   return result;
 }
 
-Health Navigator::health() {
+Health Navigator::Core::health() {
   if (phase_ == AlignmentPhase::waiting) {
     health_.status = NavigationStatus::uninitialised;
   } else if (phase_ == AlignmentPhase::levelled) {
@@ -249,5 +261,85 @@ Health Navigator::health() {
   }
   return health_;
 }
+
+Status check(const NavigatorOptions& o) {
+  if (Status status = within("filter", check(o.filter)); !status) return status;
+  if (Status status = within("alignment", check(o.alignment)); !status) return status;
+  constexpr double kFar = 1e3;
+  const OptionRange ranges[] = {
+      {"gnss_lever_arm_x", o.gnss_lever_arm.x(), -kFar, kFar},
+      {"gnss_lever_arm_y", o.gnss_lever_arm.y(), -kFar, kFar},
+      {"gnss_lever_arm_z", o.gnss_lever_arm.z(), -kFar, kFar},
+      {"gnss_position_latency", o.gnss_position_latency, -10, 10},
+      {"gnss_velocity_latency", o.gnss_velocity_latency, -10, 10},
+      {"barometer_latency", o.barometer_latency, -10, 10},
+      {"magnetometer_latency", o.magnetometer_latency, -10, 10},
+      {"camera_time_offset", o.camera_time_offset, -kFar, kFar},
+      {"declination", o.declination, -std::numbers::pi, std::numbers::pi},
+      {"history", o.history, above_zero, 60},
+      {"imu_rate", o.imu_rate, 1, 1e5},
+      {"dead_reckoning_after", o.dead_reckoning_after, above_zero},
+      {"longest_gap", o.longest_gap, above_zero, 60},
+      {"scale_error_limit", o.scale_error_limit, above_zero},
+      {"scale_error_sigmas", o.scale_error_sigmas, 0, finite},
+      {"direction_error_limit", o.direction_error_limit, above_zero},
+      {"direction_error_sigmas", o.direction_error_sigmas, 0, finite},
+  };
+  return check_ranges(ranges);
+}
+
+Result<Navigator> Navigator::create(const NavigatorOptions& options) {
+  if (const Status status = check(options); !status) return status.error();
+  return Navigator(options);
+}
+
+Navigator::Navigator(const NavigatorOptions& options) : core_(std::make_unique<Core>(options)) {}
+Navigator::Navigator(Navigator&&) noexcept = default;
+Navigator& Navigator::operator=(Navigator&&) noexcept = default;
+Navigator::~Navigator() = default;
+
+void Navigator::add(const ImuSample& sample) { core_->add(sample); }
+void Navigator::add(const GnssFix& measurement) {
+  core_->add(Measurement(measurement), core_->options().gnss_position_latency,
+             measurement.position.allFinite() && measurement.covariance.allFinite());
+}
+void Navigator::add(const GnssVelocity& measurement) {
+  core_->add(Measurement(measurement), core_->options().gnss_velocity_latency,
+             measurement.velocity.allFinite() && measurement.covariance.allFinite());
+}
+void Navigator::add(const BarometricHeight& measurement) {
+  core_->add(Measurement(measurement), core_->options().barometer_latency,
+             std::isfinite(measurement.height) && std::isfinite(measurement.sigma));
+}
+void Navigator::add(const Heading& measurement) {
+  core_->add(Measurement(measurement), 0, std::isfinite(measurement.yaw) && std::isfinite(measurement.sigma));
+}
+void Navigator::add(const MagneticField& measurement) {
+  core_->add(Measurement(measurement), core_->options().magnetometer_latency,
+             measurement.field.allFinite() && std::isfinite(measurement.sigma));
+}
+void Navigator::add(const ZeroVelocity& measurement) {
+  core_->add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
+}
+void Navigator::add(const RangeToGround& measurement) {
+  core_->add(Measurement(measurement), 0,
+             std::isfinite(measurement.range) && std::isfinite(measurement.sigma) &&
+                 std::isfinite(measurement.ground_height));
+}
+
+void Navigator::add(const RoadMotion& measurement) {
+  core_->add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
+}
+
+RelativePose Navigator::relative_pose(Time t1, Time t2, const Pose& T_body_camera) {
+  return core_->relative_pose(t1, t2, T_body_camera);
+}
+AbsolutePose Navigator::absolute_pose(Time t) { return core_->absolute_pose(t); }
+Health Navigator::health() { return core_->health(); }
+Time Navigator::newest() const { return core_->newest(); }
+void Navigator::on_retired(std::function<void(const Measurement&)> sink) {
+  core_->on_retired(std::move(sink));
+}
+void Navigator::finish() { core_->retire(Time{INT64_MAX}); }
 
 }  // namespace pade::navigation

@@ -6,15 +6,17 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
-#include <optional>
+#include <memory>
 #include <string_view>
 
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/core/result.hpp"
 #include "pade/core/sensors/measurements.hpp"
-#include "pade/navigation/alignment.hpp"
-#include "pade/navigation/timeline.hpp"
+#include "pade/navigation/filter_options.hpp"
+#include "pade/navigation/measurement.hpp"
 
 namespace pade::navigation {
 
@@ -62,6 +64,8 @@ struct NavigatorOptions {
     field("direction_error_sigmas", self.direction_error_sigmas, "sigmas that must fit into it");
   }
 };
+
+Status check(const NavigatorOptions& options);
 
 enum class NavigationStatus : std::uint8_t {
   uninitialised,
@@ -113,7 +117,12 @@ struct AbsolutePose {
 
 class Navigator {
  public:
-  explicit Navigator(const NavigatorOptions& options);
+  /// Refuses options that make no sense; the message names the option.
+  static Result<Navigator> create(const NavigatorOptions& options);
+  explicit Navigator(const NavigatorOptions& options);  ///< of options that check() accepts
+  Navigator(Navigator&&) noexcept;
+  Navigator& operator=(Navigator&&) noexcept;
+  ~Navigator();
 
   // Each stamped at the moment of measurement (less the sensor's latency), in any order. Refused data is
   // counted.
@@ -134,37 +143,15 @@ class Navigator {
   AbsolutePose absolute_pose(Time t);
 
   [[nodiscard]] Health health();
-  [[nodiscard]] Time newest() const { return newest_; }
+  [[nodiscard]] Time newest() const;  ///< of the IMU samples
   /// Called with each measurement when it leaves the history, with the innovation of its last use.
-  void on_retired(std::function<void(const Measurement&)> sink) { sink_ = std::move(sink); }
+  void on_retired(std::function<void(const Measurement&)> sink);
   /// Retires everything: at the end of a log.
   void finish();
 
  private:
-  struct Keyframe {
-    Time time;
-    FilterSnapshot snapshot;
-  };
-
-  void add(Measurement measurement, double latency, bool finite);
-  void advance_live(Time to);
-  void restart();
-  void retire(Time before);
-  bool load_scratch(Time t, Answer& answer);
-  [[nodiscard]] Time imu_time(Time image) const;
-  [[nodiscard]] NavigationStatus status_of(Filter& filter) const;
-
-  NavigatorOptions options_;
-  Timeline timeline_;
-  Alignment alignment_;
-  AlignmentPhase phase_ = AlignmentPhase::waiting;
-  Filter live_;
-  Filter scratch_;
-  TimeRing<Keyframe> keyframes_;
-  bool has_imu_ = false;
-  Time newest_;
-  Health health_;
-  std::function<void(const Measurement&)> sink_;
+  class Core;
+  std::unique_ptr<Core> core_;
 };
 
 }  // namespace pade::navigation

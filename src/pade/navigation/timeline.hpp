@@ -11,45 +11,6 @@
 
 namespace pade::navigation {
 
-/// Also the order in which measurements of one stamp are used.
-enum class SensorKind : std::uint8_t {
-  gnss_velocity,
-  gnss_position,
-  barometer,
-  heading,
-  magnetometer,
-  zero_velocity,
-  range,
-  road
-};
-
-/// A measurement of any kind.
-struct Measurement {
-  Time time;
-  SensorKind kind = SensorKind::gnss_position;
-  Vector3d value = Vector3d::Zero();           ///< scalar sensors use the first component
-  Matrix3d covariance = Matrix3d::Identity();  ///< GNSS only
-  double sigma = 0;                            ///< the others
-  double extra = 0;                            ///< ground height of a range
-  Innovation innovation;                       ///< of its last use by the live filter
-
-  Measurement() = default;
-  explicit Measurement(const GnssFix& m) : time(m.time), value(m.position), covariance(m.covariance) {}
-  explicit Measurement(const GnssVelocity& m)
-      : time(m.time), kind(SensorKind::gnss_velocity), value(m.velocity), covariance(m.covariance) {}
-  explicit Measurement(const BarometricHeight& m)
-      : time(m.time), kind(SensorKind::barometer), value(m.height, 0, 0), sigma(m.sigma) {}
-  explicit Measurement(const Heading& m)
-      : time(m.time), kind(SensorKind::heading), value(m.yaw, 0, 0), sigma(m.sigma) {}
-  explicit Measurement(const MagneticField& m)
-      : time(m.time), kind(SensorKind::magnetometer), value(m.field), sigma(m.sigma) {}
-  explicit Measurement(const ZeroVelocity& m)
-      : time(m.time), kind(SensorKind::zero_velocity), sigma(m.sigma) {}
-  explicit Measurement(const RangeToGround& m)
-      : time(m.time), kind(SensorKind::range), value(m.range, 0, 0), sigma(m.sigma), extra(m.ground_height) {}
-  explicit Measurement(const RoadMotion& m) : time(m.time), kind(SensorKind::road), sigma(m.sigma) {}
-};
-
 /// Uses one measurement in the filter.
 Innovation apply(Filter& filter, const Measurement& measurement, double declination);
 

@@ -12,14 +12,16 @@
 #include <fmt/format.h>
 
 #include "pade/checks/run_hints.hpp"
+#include "pade/core/option_check.hpp"
 #include "pade/core/version.hpp"
 #include "pade/io/formats/cloud_files.hpp"
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
-#include "pade/pipeline/navigation_run.hpp"
+#include "pade/io/text.hpp"
+#include "pade/pipeline/poses_from_sensors.hpp"
 #include "pade/pipeline/run_tally.hpp"
-#include "pade/report/accuracy_tables.hpp"
 #include "pade/report/report.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 namespace pade {
 namespace {
@@ -159,7 +161,7 @@ class Run {
   [[nodiscard]] io::RunInfo info() const {
     io::RunInfo info;
     info.version = version;
-    info.sequence = std::filesystem::absolute(sequence_.folder()).lexically_normal();
+    info.sequence = io::absolute_path(sequence_.folder()).lexically_normal();
     info.poses = sequence_.pose_file().filename().string();
     info.options = io::to_json(options_);
     info.camera = sequence_.camera();
@@ -247,16 +249,38 @@ class Run {
 
 }  // namespace
 
+Status check(const MapSequenceOptions& options) {
+  if (Status status = within("mapper", check(options.mapper)); !status) return status;
+  if (Status status = within("sequence", check(options.sequence)); !status) return status;
+  if (Status status = within("navigation", check(options.navigation)); !status) return status;
+  return within("cloud", check(options.cloud));
+}
+
+void set_imu(MapSequenceOptions& options, navigation::ImuClass imu) {
+  options.imu = imu;
+  options.navigation.filter = navigation::FilterOptions::of(imu);
+}
+
+Status read_options(std::string_view text, std::string_view file, MapSequenceOptions& options) {
+  MapSequenceOptions read = options;
+  if (Status status = io::from_yaml(text, file, read); !status) return status;
+  if (read.imu == options.imu) {
+    options = read;
+    return {};
+  }
+  set_imu(options, read.imu);
+  return io::from_yaml(text, file, options);
+}
+
 Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options) {
   if (options.sequence.poses != poses_from_sensors) return io::Sequence::open(folder, options.sequence);
-  navigation::NavigatorOptions navigator;
-  navigator.filter = navigation::FilterOptions::of(options.imu);
-  return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(navigator));
+  return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation));
 }
 
 Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,
                                io::RunWriter& writer, int threads,
                                const std::function<bool(const MapProgress&)>& progress) {
+  if (const Status status = check(options); !status) return status.error();
   auto mapper = ObstacleMapper::create(sequence.camera(), options.mapper, sequence.mask());
   if (!mapper) return mapper.error();
 

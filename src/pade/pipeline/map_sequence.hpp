@@ -3,7 +3,7 @@
 
 #include <filesystem>
 #include <functional>
-#include <string>
+#include <string_view>
 
 #include "pade/core/result.hpp"
 #include "pade/evaluation/depth_accuracy.hpp"
@@ -11,7 +11,7 @@
 #include "pade/io/run/run_writer.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/mapping/cloud_builder.hpp"
-#include "pade/navigation/filter_options.hpp"
+#include "pade/navigation/navigator.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 
 namespace pade {
@@ -21,6 +21,7 @@ struct MapSequenceOptions {
   ObstacleMapperOptions mapper;
   io::SequenceOptions sequence;
   navigation::ImuClass imu = navigation::ImuClass::industrial;
+  navigation::NavigatorOptions navigation;
   mapping::CloudOptions cloud;
   bool pcd = false;
   bool world_coordinates = false;
@@ -31,6 +32,8 @@ struct MapSequenceOptions {
     field("mapper", self.mapper, "the pipeline");
     field("sequence", self.sequence, "how the recording is read");
     field("imu", self.imu, "industrial | consumer: class of the IMU where poses are from-imu-gnss");
+    field("navigation", self.navigation,
+          "the filter where poses are from-imu-gnss; what the calibration says of its mounting goes first");
     field("cloud", self.cloud, "the point cloud of the run");
     field("pcd", self.pcd, "also writes cloud.pcd");
     field("world_coordinates", self.world_coordinates,
@@ -39,6 +42,15 @@ struct MapSequenceOptions {
     field("report", self.report, "writes report.html");
   }
 };
+
+/// Refuses what makes no sense (core/option_check.hpp).
+Status check(const MapSequenceOptions& options);
+
+/// Sets what a YAML text names; where that is another class of IMU, the rest of the filter's options are
+/// those of the class. Errors: those of io::from_yaml().
+Status read_options(std::string_view text, std::string_view file, MapSequenceOptions& options);
+/// The class of the IMU, and the filter's options for it.
+void set_imu(MapSequenceOptions& options, navigation::ImuClass imu);
 
 /// Opens a sequence with the poses that the options ask for: read from a file, or from-imu-gnss.
 Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options);

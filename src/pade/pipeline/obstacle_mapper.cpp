@@ -7,6 +7,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "pade/core/option_check.hpp"
 #include "pade/depth/derotation.hpp"
 #include "pade/depth/pair_fusion.hpp"
 #include "pade/depth/prediction.hpp"
@@ -41,34 +42,6 @@ std::string size_text(const cv::Mat& image) {
   return std::to_string(image.cols) + " x " + std::to_string(image.rows);
 }
 
-/// The numbers of two baselines, refinement, bounds and edges; the message names the first that makes no
-/// sense.
-Status check_chain(const ObstacleMapperOptions& o, int largest_window) {
-  struct Range {
-    const char* option;
-    double value, from, to;
-  };
-  constexpr double kMost = 1e6;
-  const Range ranges[] = {
-      {"longest_step", static_cast<double>(o.longest_step), 1, 1000},
-      {"prior_level", static_cast<double>(o.prior_level), -1, 16},
-      {"largest_parallax", o.largest_parallax, 0, kMost},
-      {"refinement.pixels", static_cast<double>(o.refinement.pixels), 1, kMost},
-      {"edges.radius", static_cast<double>(o.edges.radius), 0, std::min(0.5 * largest_window, 64.0)},
-      {"edges.nearness", o.edges.nearness, 0, 1},
-      {"edges.hole", o.edges.hole, 0, kMost},
-      {"depth.bound_sigmas", o.depth.bound_sigmas, 0, kMost},
-      {"depth.flow_sigma_scale", o.depth.flow_sigma_scale, 0, kMost},
-      {"depth.flow_relative_sigma", o.depth.flow_relative_sigma, 0, kMost},
-  };
-  for (const Range& range : ranges) {
-    if (range.value >= range.from && range.value <= range.to) continue;  // false for NaN
-    return Error{std::string("option ") + range.option + " is " + std::to_string(range.value) +
-                 ", expected " + std::to_string(range.from) + " to " + std::to_string(range.to)};
-  }
-  return {};
-}
-
 Status check(const Camera& camera, const ObstacleMapperOptions& options, const cv::Mat& valid) {
   if (camera.width < 16 || camera.height < 16 || !(camera.fx > 0) || !(camera.fy > 0) ||
       !camera.is_pinhole()) {
@@ -80,19 +53,13 @@ Status check(const Camera& camera, const ObstacleMapperOptions& options, const c
     return Error{"the mask is " + size_text(valid) + ", expected one 8-bit channel of the camera's " +
                  std::to_string(camera.width) + " x " + std::to_string(camera.height)};
   }
-  if (options.step < 1)
-    return Error{"option step is " + std::to_string(options.step) + ", expected at least 1"};
+  if (const Status status = check(options); !status) return status;
   const int largest = std::min(camera.width, camera.height);
-  if (options.depth.window < 1 || options.depth.window > largest) {
-    return Error{"option window is " + std::to_string(options.depth.window) + ", expected 1 to " +
-                 std::to_string(largest)};
-  }
-  const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
-  if (!positive(options.depth.range)) {
-    return Error{"option range is " + std::to_string(options.depth.range) +
-                 ", expected a positive number of metres"};
-  }
-  return check_chain(options, largest);
+  const OptionRange ranges[] = {
+      {"depth.window", static_cast<double>(options.depth.window), 1, static_cast<double>(largest)},
+      {"edges.radius", static_cast<double>(options.edges.radius), 0, 0.5 * largest},
+  };
+  return check_ranges(ranges);
 }
 
 /// The motion that the poses as given tell, with its covariance. Over several frames the error is that of a
@@ -128,6 +95,20 @@ flow::FlowOptions flow_options(int level, flow::InitialFlow initial) {
 constexpr int kGuidedLevel = 1;  // flow over the longer baseline starts near its end
 
 }  // namespace
+
+Status check(const ObstacleMapperOptions& o) {
+  const OptionRange ranges[] = {
+      {"step", static_cast<double>(o.step), 1, 1000},
+      {"longest_step", static_cast<double>(o.longest_step), 1, 1000},
+      {"prior_level", static_cast<double>(o.prior_level), -1, 16},
+      {"largest_parallax", o.largest_parallax, 0, 1e6},
+  };
+  if (Status status = check_ranges(ranges); !status) return status;
+  if (Status status = within("refinement", check(o.refinement)); !status) return status;
+  if (Status status = within("depth", check(o.depth)); !status) return status;
+  if (Status status = within("edges", check(o.edges)); !status) return status;
+  return within("map", check(o.map));
+}
 
 ObstacleMapperOptions one_pair(ObstacleMapperOptions options) {
   options.longest_step = 1;
@@ -285,7 +266,6 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   if (options_.depth.gates == depth::Gates::on) {
     const Stopwatch watch(update_, Stage::depth);
     depth::guard_edges(update_.depth, options_.edges);
-    depth::close_epipole(update_.depth, camera_, pair.motion, options_.edges.hole);
   }
   update_.depth.time = reference.time;
   update_.reference = reference;

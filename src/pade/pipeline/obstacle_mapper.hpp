@@ -67,6 +67,9 @@ struct ObstacleMapperOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const ObstacleMapperOptions& options);
+
 /// One pair of frames as it is: one baseline, the motion as given, sigma as measured in the image, edges as
 /// the flow has them. What the paper's experiments compare.
 ObstacleMapperOptions one_pair(ObstacleMapperOptions options = {});
@@ -80,7 +83,8 @@ enum class Stage { grey, derotate, flow, refine, depth, map, total };
 inline constexpr std::array<std::string_view, 7> stage_names = {"grey",  "derotate", "flow", "refine",
                                                                 "depth", "map",      "total"};
 
-/// What one call of ObstacleMapper::add() did.
+/// What one call of ObstacleMapper::add() did. A copy shares its images, which the next call writes over:
+/// clone what is to be kept.
 struct MapperUpdate {
   enum class Outcome {
     waiting,  ///< the frame was taken, but has no partner yet

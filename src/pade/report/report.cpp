@@ -9,11 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "pade/io/formats/flow_picture.hpp"
-#include "pade/report/accuracy_tables.hpp"
 #include "pade/report/report_map.hpp"
 #include "pade/report/report_pictures.hpp"
 #include "pade/report/report_style.hpp"
 #include "pade/report/report_text.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 namespace pade::evaluation {
 namespace {

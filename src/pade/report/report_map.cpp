@@ -377,7 +377,7 @@ CorridorViews draw_corridor(const MapScene& map) {
   if (map.trajectory.empty()) return views;
   const FlightEnd end = end_of_flight(map.trajectory, map.look);
   if (end.direction.isZero()) return views;
-  const Reach reach = known_free_reach(map.map, end, corridor_radius, corridor_length);
+  const FreeReach reach = known_free_reach(map.map, end, corridor_radius, corridor_length);
   views.reach = reach.distance;
   views.stopped_by = reach.stopped_by;
   Eigen::Vector3d left = map.up.cross(end.direction);

@@ -6,7 +6,7 @@
 
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/text.hpp"
-#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 namespace pade::evaluation {
 

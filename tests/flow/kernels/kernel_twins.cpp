@@ -245,9 +245,16 @@ void farneback_twins(Twins& twins, simd::InstructionSet set, Images& m) {
 }
 
 void confidence_twin(Twins& twins, simd::InstructionSet set, Images& m) {
+  // Waves: the same in both on the left, others in the second on the right, where no match is right.
+  const Plane first = filled(
+      kWidth, kHeight, [](int x, int y) { return 120 + 50 * std::sin(0.5 * x) + 40 * std::cos(0.4 * y); });
+  const Plane second = filled(kWidth, kHeight, [](int x, int y) {
+    return x < kWidth / 2 ? 118 + 50 * std::sin(0.5 * x) + 40 * std::cos(0.4 * y)
+                          : 120 + 60 * std::sin(0.7 * y) + 30 * std::cos(0.3 * x);
+  });
   ConfidenceInput input;
-  input.first = m.first.view();
-  input.second = m.second.view();
+  input.first = first.view();
+  input.second = second.view();
   input.u = m.u.view();
   input.v = m.v.view();
   input.backward_u = m.v.view();
@@ -257,6 +264,8 @@ void confidence_twin(Twins& twins, simd::InstructionSet set, Images& m) {
   input.radius = kRadius;
   input.noise = 1;
   input.effective_size = 9;
+  int wrong_matches = 0;
+  int right_matches = 0;
   twins.compare(
       "flow_sigma", input.sigma,
       [&](int a, int b) {
@@ -277,12 +286,28 @@ void confidence_twin(Twins& twins, simd::InstructionSet set, Images& m) {
         const double yy = window([&](int i, int j) { return gy(i, j) * gy(i, j); }, x, y);
         const double r = window(residual, x, y);
         const double rr = window([&](int i, int j) { return residual(i, j) * residual(i, j); }, x, y);
+        const auto clamped = [&](int i, int j) {
+          return residual(std::clamp(i, 0, kWidth - 1), std::clamp(j, 0, kHeight - 1));
+        };
+        const double left = window(
+            [&](int i, int j) {
+              const double rx = 0.5 * (clamped(i + 1, j) - clamped(i - 1, j));
+              const double ry = 0.5 * (clamped(i, j + 1) - clamped(i, j - 1));
+              return rx * rx + ry * ry;
+            },
+            x, y);
+        const double limit = 0.15 + 2 / (1 + std::hypot(at(input.u, x, y), at(input.v, x, y)));
+        const bool wrong = left - 2 > limit * (2 * (xx + yy) + 2);
+        ++(wrong ? wrong_matches : right_matches);
+        if (wrong) return std::numeric_limits<double>::infinity();
         const double covariance =
             std::max(rr - r * r, 1.0) * (0.5 * (xx + yy) + 1e-4) / (9 * std::max(xx * yy - xy * xy, 1e-8));
         const double eu = at(input.u, x, y) + bilinear(input.backward_u, to_x, to_y);
         const double ev = at(input.v, x, y) + bilinear(input.backward_v, to_x, to_y);
         return std::sqrt(covariance + 0.5 * (eu * eu + ev * ev));
       });
+  const int fewest = kWidth * kHeight / 20;
+  if (wrong_matches < fewest || right_matches < fewest) twins.results.back().strips_agree = false;
 }
 
 }  // namespace

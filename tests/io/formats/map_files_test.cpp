@@ -48,7 +48,7 @@ class MapFile : public testing::TestWithParam<const char*> {
 void expect_same_space(const OccupancyMap& map, const octomap::OcTree& tree) {
   std::size_t checked = 0;
   map.for_each([&](const MapCell& cell, Occupancy state) {
-    const octomap::OcTreeNode* node = tree.search(cell.key);
+    const octomap::OcTreeNode* node = tree.search(octomap::OcTreeKey(cell.key[0], cell.key[1], cell.key[2]));
     ASSERT_NE(node, nullptr);
     ASSERT_EQ(tree.isNodeOccupied(node), state == Occupancy::occupied);
     ++checked;

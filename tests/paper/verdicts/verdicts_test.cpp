@@ -20,7 +20,7 @@ namespace pade::evaluation {
 namespace {
 using testing::HasSubstr;
 
-const std::vector<std::string> kFlows = {"clg-fast", "farneback", "lucas-kanade"};
+const std::vector<std::string> kFlowNames = {"clg-fast", "farneback", "lucas-kanade"};
 
 // Mean errors per range of a method in a world; every sequence scatters around them by a few percent.
 struct World {
@@ -48,7 +48,7 @@ std::vector<ErrorRow> rows_of(const World& world, double scatter = 0.02, std::ui
   std::vector<ErrorRow> rows;
   for (int s = 0; s < world.sequences; ++s) {
     const double scene = 1 + 0.2 * random.normal();  // hits both methods alike
-    for (const std::string& flow : kFlows) {
+    for (const std::string& flow : kFlowNames) {
       for (const auto& [noise, on] : {std::pair{0.0, NoiseOn::motion}, std::pair{0.2, NoiseOn::motion},
                                       std::pair{0.2, NoiseOn::velocity}}) {
         ErrorRow row{sequence_name(s), flow, noise, on, {}, {}};
@@ -233,7 +233,7 @@ std::vector<TimeRow> times_of(double clg, double farneback, double lk, double tt
   for (int s = 0; s < 8; ++s) {
     const auto scattered = [&](double ms) { return ms * (1 + 0.03 * random.normal()); };
     for (const auto& [flow, ms] :
-         {std::pair{kFlows[0], clg}, std::pair{kFlows[1], farneback}, std::pair{kFlows[2], lk}})
+         {std::pair{kFlowNames[0], clg}, std::pair{kFlowNames[1], farneback}, std::pair{kFlowNames[2], lk}})
       rows.push_back({sequence_name(s), flow, scattered(ms), scattered(ttc), scattered(pade)});
   }
   return rows;

@@ -9,7 +9,7 @@
 namespace pade::flow {
 
 /// `threads` - 1 helpers beside the calling thread. One pair of images is some hundred short rounds of work,
-/// so whoever waits for the next one looks for a while before he sleeps.
+/// so a thread that waits for the next one spins briefly before it blocks.
 class WorkerPool {
  public:
   explicit WorkerPool(int threads) {
@@ -31,11 +31,19 @@ class WorkerPool {
     work_ = &work;
     pending_.store(static_cast<int>(helpers_.size()), std::memory_order_relaxed);
     announce();
+    const Wait wait{*this};  // also where work(0) throws: until they are done, the helpers use `work`
     work(0);
-    for (int left = pending_.load(std::memory_order_acquire); left != 0;) left = after(pending_, left);
   }
 
  private:
+  struct Wait {
+    WorkerPool& pool;
+    ~Wait() {
+      const std::atomic<int>& pending = pool.pending_;
+      for (int left = pending.load(std::memory_order_acquire); left != 0;) left = after(pending, left);
+    }
+  };
+
   void announce() {
     round_.fetch_add(1, std::memory_order_release);
     round_.notify_all();

@@ -45,10 +45,10 @@ FlightEnd end_of_flight(const std::vector<Eigen::Vector3d>& path, const Eigen::V
   return {end, (way.norm() >= kShortest ? way : look).normalized()};
 }
 
-Reach known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
-                       double farthest) {
+FreeReach known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
+                           double farthest) {
   const double step = 0.25 * map.options().voxel;
-  Reach reach;
+  FreeReach reach;
   for (int i = 1; i * step <= farthest; ++i) {
     reach.stopped_by = worst_at(map, from.position + i * step * from.direction, from.position, radius);
     if (reach.stopped_by != mapping::Occupancy::free) break;

@@ -22,7 +22,7 @@ struct FlightEnd {
 FlightEnd end_of_flight(const std::vector<Eigen::Vector3d>& path, const Eigen::Vector3d& look);
 
 /// How far a sphere gets, and what it meets there.
-struct Reach {
+struct FreeReach {
   double distance = 0;                                       ///< of its centre from the start, metres
   mapping::Occupancy stopped_by = mapping::Occupancy::free;  ///< free where nothing stops it
 };
@@ -30,8 +30,8 @@ struct Reach {
 /// How far the centre of a sphere can go straight on from `from`, until the sphere first meets a voxel that
 /// is not known to be free (to a quarter of a voxel, at most `farthest` metres). Voxels that the sphere
 /// touches where it starts count as free: the vehicle is there.
-Reach known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
-                       double farthest);
+FreeReach known_free_reach(const mapping::OccupancyMap& map, const FlightEnd& from, double radius,
+                           double farthest);
 
 /// CV_8UC1 of mapping::Occupancy over a rectangle in space.
 /// @param corner  centre of the top left pixel, world, metres

@@ -1,6 +1,9 @@
 // The ceiling of a map: OctoMap itself, fed with exact depth.
 #pragma once
 
+#include <memory>
+
+#include <octomap/OcTree.h>
 #include <opencv2/core.hpp>
 
 #include "pade/core/camera.hpp"

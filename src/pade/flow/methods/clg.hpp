@@ -9,42 +9,21 @@
 namespace pade::flow {
 
 struct ClgOptions {
-  FlowOptions pyramid;
-  int warps = 1;
-  int coarse_warps = 5;
-  int lagged = 1;
-  int sweeps = 8;
-  double omega = 1.9;
-  double alpha = 8;
-  double gamma = 30;
-  double normalisation = 0;
-  double data_epsilon = 1;
-  double smooth_epsilon = 0.02;
-  double rho = 0.4;
-  int radius = 1;
-  int median = 5;
-  int coarse_median = 5;
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& field) {
-    field("pyramid", self.pyramid, "options of all coarse-to-fine methods");
-    field("warps", self.warps, "warps on the finest level");
-    field("coarse_warps", self.coarse_warps, "warps on each coarser level");
-    field("lagged", self.lagged, "updates of the robust weights per warp");
-    field("sweeps", self.sweeps, "red-black sweeps per update of the weights");
-    field("omega", self.omega, "over-relaxation factor");
-    field("alpha", self.alpha, "weight of the smoothness term");
-    field("gamma", self.gamma, "weight of gradient constancy against brightness constancy");
-    field("normalisation", self.normalisation,
-          "zeta of the constraint normalisation, grey values per pixel; 0 = none");
-    field("data_epsilon", self.data_epsilon, "scale of the robust data term, grey values; 0 = quadratic");
-    field("smooth_epsilon", self.smooth_epsilon,
-          "scale of the robust smoothness term, pixels per pixel; 0 = quadratic");
-    field("rho", self.rho, "standard deviation of the tensor's window, pixels");
-    field("radius", self.radius, "radius of that window, pixels; 0 = none");
-    field("median", self.median, "size of the median filter after each warp of the finest level: 0, 3 or 5");
-    field("coarse_median", self.coarse_median, "and of each coarser level");
-  }
+  FlowOptions pyramid;           ///< options of all coarse-to-fine methods
+  int warps = 1;                 ///< warps on the finest level
+  int coarse_warps = 5;          ///< warps on each coarser level
+  int lagged = 1;                ///< updates of the robust weights per warp
+  int sweeps = 8;                ///< red-black sweeps per update of the weights
+  double omega = 1.9;            ///< over-relaxation factor
+  double alpha = 8;              ///< weight of the smoothness term
+  double gamma = 30;             ///< weight of gradient constancy against brightness constancy
+  double normalisation = 0;      ///< zeta of the constraint normalisation, grey values per pixel; 0 = none
+  double data_epsilon = 1;       ///< scale of the robust data term, grey values; 0 = quadratic
+  double smooth_epsilon = 0.02;  ///< scale of the robust smoothness term, pixels per pixel; 0 = quadratic
+  double rho = 0.4;              ///< standard deviation of the tensor's window, pixels
+  int radius = 1;                ///< radius of that window, pixels; 0 = none
+  int median = 5;                ///< size of the median filter after each warp of the finest level: 0, 3 or 5
+  int coarse_median = 5;         ///< and of each coarser level
 };
 
 ClgOptions clg_fast_options();

@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/text.hpp"
+
 namespace pade::io {
 namespace {
 
@@ -45,7 +47,7 @@ std::optional<int> number_in(const fs::path& file) {
 }
 
 std::string name_of(const fs::path& folder) {
-  const fs::path normal = fs::absolute(folder).lexically_normal();
+  const fs::path normal = absolute_path(folder).lexically_normal();
   return (normal.has_filename() ? normal.filename() : normal.parent_path().filename()).string();
 }
 
@@ -122,7 +124,7 @@ std::vector<FlowPair> of_kitti(const fs::path& images, const fs::path& truth) {
 
 /// The layouts of whole downloads.
 std::vector<FlowPair> of_download(const fs::path& folder) {
-  const fs::path parent = fs::absolute(folder).lexically_normal();
+  const fs::path parent = absolute_path(folder).lexically_normal();
   const fs::path above = parent.has_filename() ? parent.parent_path() : parent.parent_path().parent_path();
   for (const fs::path& root : {folder, folder / "training", above}) {
     for (const auto& [data, truth] :

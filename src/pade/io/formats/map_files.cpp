@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <octomap/OcTree.h>
 
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"

@@ -9,7 +9,7 @@
 
 #include "pade/core/result.hpp"
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/sequence/calibration.hpp"
+#include "pade/io/world.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 
 namespace pade::io {

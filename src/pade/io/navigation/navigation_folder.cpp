@@ -28,7 +28,7 @@ std::filesystem::path file_ending_with(const std::filesystem::path& folder, std:
 Result<std::filesystem::path> gnss_file(const std::filesystem::path& folder, const std::string& chosen) {
   namespace fs = std::filesystem;
   if (!chosen.empty()) return folder / chosen;
-  if (fs::exists(folder / "gnss.csv")) return folder / "gnss.csv";
+  if (path_exists(folder / "gnss.csv")) return folder / "gnss.csv";
   std::vector<std::string> candidates;
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
@@ -46,7 +46,7 @@ Result<std::filesystem::path> gnss_file(const std::filesystem::path& folder, con
 template <class Parse>
 auto read_optional(const std::filesystem::path& path, Parse parse, std::vector<std::string>& remarks)
     -> decltype(parse(std::string_view(), std::string_view(), remarks)) {
-  if (path.empty() || !std::filesystem::exists(path)) {
+  if (path.empty() || !path_exists(path)) {
     return typename std::remove_cvref_t<decltype(*parse(std::string_view(), std::string_view(), remarks))>{};
   }
   const auto text = read_file(path);
@@ -63,12 +63,12 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   fs::path imu = folder / "imu.csv";
   fs::path truth = folder / "truth.csv";
   for (const fs::path& euroc : {folder / "mav0", folder}) {
-    if (!fs::exists(imu) && fs::exists(euroc / "imu0" / "data.csv")) {
+    if (!path_exists(imu) && path_exists(euroc / "imu0" / "data.csv")) {
       imu = euroc / "imu0" / "data.csv";
       truth = euroc / "state_groundtruth_estimate0" / "data.csv";
     }
   }
-  if (!fs::exists(imu)) imu = file_ending_with(folder, "-imu.csv");
+  if (!path_exists(imu)) imu = file_ending_with(folder, "-imu.csv");
   if (imu.empty())
     return Error{
         fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv", folder.string())};
@@ -93,7 +93,7 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   auto magnetometer = read_optional(folder / "mag.csv", parse_magnetometer, log.remarks);
   if (!magnetometer) return magnetometer.error();
   log.magnetometer = std::move(*magnetometer);
-  const bool simulated = !fs::exists(truth) && fs::exists(folder / "body_truth.txt");
+  const bool simulated = !path_exists(truth) && path_exists(folder / "body_truth.txt");
   auto states = simulated ? read_optional(folder / "body_truth.txt", parse_body_truth, log.remarks)
                           : read_optional(truth, parse_truth, log.remarks);
   if (!states) return states.error();

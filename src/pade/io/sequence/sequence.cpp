@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/core/option_check.hpp"
 #include "pade/io/sequence/frame_mask.hpp"
 #include "pade/io/sequence/image_file.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
@@ -224,24 +225,26 @@ void make_relative(ReadReport& report, const fs::path& folder) {
   }
 }
 
-Status check_options(const SequenceOptions& options) {
+}  // namespace
+
+Status check(const SequenceOptions& options) {
   if (!options.world_up.empty() && !parse_direction(options.world_up)) {
-    return Error{fmt::format("world_up: found {}, expected +x, -x, +y, -y, +z, -z or three numbers",
+    return Error{fmt::format("option world_up is {}, expected +x, -x, +y, -y, +z, -z or three numbers",
                              in_quotes(options.world_up))};
   }
   const bool named = options.origin == "auto" || options.origin == "flight" || options.origin == "none";
   if (!named && !parse_point(options.origin)) {
-    return Error{fmt::format("origin: found {}, expected auto, flight, none or three numbers in metres",
+    return Error{fmt::format("option origin is {}, expected auto, flight, none or three numbers in metres",
                              in_quotes(options.origin))};
   }
-  if (options.camera < 0) return Error{"camera: expected a number >= 0"};
-  if (!(options.largest_pose_gap >= 0)) return Error{"largest_pose_gap: expected a number of seconds >= 0"};
-  if (!(options.largest_truth_gap >= 0)) return Error{"largest_truth_gap: expected a number of seconds >= 0"};
-  if (options.mask_growth < 0) return Error{"mask_growth: expected a number of pixels >= 0"};
-  return {};
+  if (options.camera < 0) return Error{"option camera: expected a number >= 0"};
+  const OptionRange ranges[] = {
+      {"largest_pose_gap", options.largest_pose_gap},
+      {"largest_truth_gap", options.largest_truth_gap},
+      {"mask_growth", static_cast<double>(options.mask_growth), 0, 65536},
+  };
+  return check_ranges(ranges);
 }
-
-}  // namespace
 
 struct Sequence::Data {
   fs::path folder;
@@ -369,7 +372,7 @@ void Sequence::Data::choose_origin() {
 
 Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& options,
                                 const PoseSource& source) {
-  if (auto good = check_options(options); !good) return good.error();
+  if (auto good = io::check(options); !good) return good.error();
   auto data = std::make_unique<Data>();
   data->folder = folder;
   data->options = options;

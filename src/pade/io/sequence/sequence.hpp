@@ -56,6 +56,9 @@ struct SequenceOptions {
   }
 };
 
+/// Refuses what makes no sense (core/option_check.hpp).
+Status check(const SequenceOptions& options);
+
 /// Poses that are computed instead of read.
 struct ComputedPoses {
   std::vector<StampedPose> poses;         ///< T_world_camera at the times of the images that have a pose

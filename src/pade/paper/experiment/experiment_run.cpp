@@ -86,7 +86,7 @@ Result<Experiment> experiment_from_json(std::string_view text, std::string_view 
 }
 
 std::string sequence_name(const fs::path& folder) {
-  const fs::path whole = fs::absolute(folder).lexically_normal();
+  const fs::path whole = io::absolute_path(folder).lexically_normal();
   return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
 }
 

@@ -10,7 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "pade/paper/verdicts/verdicts.hpp"
-#include "pade/report/result_table.hpp"
+#include "pade/report/tables/result_table.hpp"
 
 namespace pade::evaluation {
 

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include "pade/paper/verdicts/paper_values.hpp"
-#include "pade/report/accuracy_tables.hpp"
 #include "pade/report/report_text.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 namespace pade::experiment {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "pade/paper/experiment/experiment_results.hpp"
 #include "pade/paper/verdicts/verdicts.hpp"
-#include "pade/report/result_table.hpp"
+#include "pade/report/tables/result_table.hpp"
 
 namespace pade::experiment {
 

@@ -4,8 +4,7 @@
 #include <cstdio>
 
 #include <opencv2/imgproc.hpp>
-
-#include "pade/pipeline/obstacle_mapper.hpp"
+#include <pade/pade.hpp>
 
 int main() {
   const pade::Camera camera{.width = 320, .height = 240, .fx = 320, .fy = 320, .cx = 159.5, .cy = 119.5};

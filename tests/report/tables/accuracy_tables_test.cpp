@@ -1,5 +1,5 @@
 // The same figures as table, CSV and JSON.
-#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include <cmath>
 #include <sstream>

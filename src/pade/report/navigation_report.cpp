@@ -1,4 +1,4 @@
-#include "pade/pipeline/navigation_report.hpp"
+#include "pade/report/navigation_report.hpp"
 
 #include <algorithm>
 #include <array>
@@ -225,22 +225,84 @@ std::string health_table(const NavigationRun& run) {
 
 }  // namespace
 
-std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run) {
+std::string format_trajectory(const NavigationRun& run) {
+  std::string text = "# t_s x y z qx qy qz qw (T_world_body, world ENU, body FLU)\n";
+  for (const NavigationFrame& frame : run.frames) {
+    const Eigen::Vector3d& p = frame.pose.T_world_body.translation;
+    const Eigen::Quaterniond& q = frame.pose.T_world_body.rotation;
+    fmt::format_to(std::back_inserter(text), "{} {:.6f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                   to_string(frame.time), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  return text;
+}
+
+std::string format_relative_motion(const NavigationRun& run) {
+  std::string text =
+      "# frame 2 in frame 1; covariance of (translation, rotation vector) in frame 1, row by row\n"
+      "t1_s,t2_s,tx,ty,tz,qx,qy,qz,qw,scale_valid,direction_valid,status";
+  for (int i = 0; i < 6; ++i) {
+    for (int j = i; j < 6; ++j) fmt::format_to(std::back_inserter(text), ",c{}{}", i, j);
+  }
+  text += '\n';
+  for (const FrameMotion& m : run.motions) {
+    const Eigen::Vector3d& t = m.pose.motion.t_reference_other;
+    const Eigen::Quaterniond q(m.pose.motion.R_reference_other);
+    fmt::format_to(std::back_inserter(text),
+                   "{},{},{:.9g},{:.9g},{:.9g},{:.12g},{:.12g},{:.12g},{:.12g},{},{},{}", to_string(m.t1),
+                   to_string(m.t2), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(),
+                   m.pose.scale_valid ? 1 : 0, m.pose.direction_valid ? 1 : 0, to_name(m.pose.status));
+    for (int i = 0; i < 6; ++i) {
+      for (int j = i; j < 6; ++j)
+        fmt::format_to(std::back_inserter(text), ",{:.6g}", m.pose.motion.covariance(i, j));
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
+                                                       const NavigationRunOptions& options,
+                                                       const NavigationRun& run) {
+  if (log.truth.empty()) return std::nullopt;
+  std::vector<evaluation::MotionError> errors;
+  for (const FrameMotion& m : run.motions) {
+    // The truth is of the body: score the motion that the body made.
+    RelativeMotion body = m.pose.motion;
+    const Pose camera{Eigen::Quaterniond(body.R_reference_other), body.t_reference_other};
+    const Pose moved = options.T_body_camera * camera * options.T_body_camera.inverse();
+    const bool same = options.T_body_camera.translation.isZero(0) &&
+                      options.T_body_camera.rotation.isApprox(Eigen::Quaterniond::Identity());
+    if (!same) {
+      body.R_reference_other = moved.matrix3();
+      body.t_reference_other = moved.translation;
+    }
+    const auto offset = Time::from_seconds(options.navigator.camera_time_offset).nanoseconds;
+    const auto error = evaluation::score({Time{m.t1.nanoseconds + offset}, Time{m.t2.nanoseconds + offset},
+                                          body, m.pose.scale_valid, m.pose.direction_valid},
+                                         log.truth);
+    if (error) errors.push_back(*error);
+  }
+  if (errors.empty()) return std::nullopt;
+  return evaluation::summarise(errors);
+}
+
+std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run,
+                              const std::optional<evaluation::MotionSummary>& score) {
   std::string html = fmt::format(
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}"
       "svg.plot {{ width: 100%; max-width: 860px; display: block; background: #fff; "
       "}}</style></head><body><main>\n<h1>{}</h1>\n",
       title, evaluation::report_style, title);
   for (const std::string& remark : log.remarks) html += "<p>" + remark + "</p>\n";
-  if (run.score) {
+  if (score) {
     html += fmt::format(
         "<table><tr><th>against truth, neighbouring frames</th><th></th></tr>\n"
         "<tr><td>translation, median / 95 %</td><td>{:.2f} / {:.2f} cm</td></tr>\n"
         "<tr><td>rotation, 95 %</td><td>{:.4f}°</td></tr>\n<tr><td>mean NEES of the translation (3 "
         "expected)</td><td>{:.2f}</td></tr>\n"
         "<tr><td>pairs</td><td>{}</td></tr></table>\n",
-        100 * run.score->translation_median, 100 * run.score->translation_95,
-        run.score->rotation_95 * 180 / M_PI, run.score->nees_mean, run.score->pairs);
+        100 * score->translation_median, 100 * score->translation_95, score->rotation_95 * 180 / M_PI,
+        score->nees_mean, score->pairs);
   }
   html += health_table(run) + path_plots(log, run) + baseline_plot(log, run);
   html += innovation_plot(run, navigation::SensorKind::gnss_velocity, "GNSS velocity", "m/s");

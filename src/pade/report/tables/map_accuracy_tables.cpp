@@ -1,4 +1,4 @@
-#include "pade/report/map_accuracy_tables.hpp"
+#include "pade/report/tables/map_accuracy_tables.hpp"
 
 #include <cmath>
 #include <functional>
@@ -21,7 +21,7 @@ double share(std::uint64_t part, std::uint64_t whole) {
                    : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string percent(double value) {
+std::string percent_cell(double value) {
   return std::isnan(value) ? fmt::format("{:>10}", "-") : fmt::format("{:8.2f} %", 100 * value);
 }
 
@@ -33,9 +33,9 @@ std::string row(const MapAccuracy& a, const std::string& name,
   return line + "\n";
 }
 
-std::string number(std::uint64_t n) { return fmt::format("{:10}", n); }
+std::string count_cell(std::uint64_t n) { return fmt::format("{:10}", n); }
 
-std::string head(const MapAccuracy& a) {
+std::string heading(const MapAccuracy& a) {
   std::string text = fmt::format(
       "{} of {} frames have a pose ({:.1f} %); {} of them a true one; voxels of {} m, range {} m; nearest "
       "surface {:.2f} m\n",
@@ -50,37 +50,38 @@ std::string head(const MapAccuracy& a) {
                     r.rms_rotation * kDegrees);
 }
 
-std::string end_of_flight(const MapAccuracy& a) {
+std::string flight_end_rows(const MapAccuracy& a) {
   std::string text = fmt::format("\n{:44}{:>10}{}\n", "Map at the end of the flight", "map",
                                  a.ceiling ? "   OctoMap, exact depth" : "");
-  text += row(a, "occupied voxels", [](const MapMeasures& m) { return number(m.occupied); });
-  text += row(a, "free voxels", [](const MapMeasures& m) { return number(m.free); });
+  text += row(a, "occupied voxels", [](const MapMeasures& m) { return count_cell(m.occupied); });
+  text += row(a, "free voxels", [](const MapMeasures& m) { return count_cell(m.free); });
   if (a.reference) {
     text += fmt::format("  {:42}{}   of {} in {} over the same {} frames\n",
                         "occupied, as share of the reference",
-                        percent(share(a.map.occupied, a.reference->occupied)), a.reference->occupied,
+                        percent_cell(share(a.map.occupied, a.reference->occupied)), a.reference->occupied,
                         a.reference->run, a.reference->frames);
   }
   text += row(a, fmt::format("surface voxels seen within {} m", a.seen_depth),
-              [](const MapMeasures& m) { return number(m.surface.voxels); });
+              [](const MapMeasures& m) { return count_cell(m.surface.voxels); });
   const auto of_surface = [](std::size_t SurfaceShares::*part) {
-    return [part](const MapMeasures& m) { return percent(share(m.surface.*part, m.surface.voxels)); };
+    return [part](const MapMeasures& m) { return percent_cell(share(m.surface.*part, m.surface.voxels)); };
   };
   text += row(a, "  occupied", of_surface(&SurfaceShares::occupied));
   text += row(a, "  occupied or a neighbour is", of_surface(&SurfaceShares::occupied_or_neighbour));
   text += row(a, "  free", of_surface(&SurfaceShares::free));
   text += row(a, "  unknown", of_surface(&SurfaceShares::unknown));
   for (std::size_t i = 0; i < Phantoms::distances.size(); ++i) {
-    text +=
-        row(a, fmt::format("occupied, over {:.0f} cm from any surface", 100 * Phantoms::distances[i]),
-            [i](const MapMeasures& m) { return percent(share(m.phantoms.farther[i], m.phantoms.occupied)); });
+    text += row(a, fmt::format("occupied, over {:.0f} cm from any surface", 100 * Phantoms::distances[i]),
+                [i](const MapMeasures& m) {
+                  return percent_cell(share(m.phantoms.farther[i], m.phantoms.occupied));
+                });
   }
   return text;
 }
 
 std::string ahead_rows(const AheadShares& ahead) {
   const auto line = [&](const std::string& name, std::size_t part) {
-    return fmt::format("  {:42}{}\n", name, percent(share(part, ahead.points)));
+    return fmt::format("  {:42}{}\n", name, percent_cell(share(part, ahead.points)));
   };
   return line("occupied within 15 cm", ahead.occupied_near) +
          line("its own voxel is occupied", ahead.occupied) + line("its own voxel is free", ahead.free) +
@@ -103,8 +104,8 @@ std::string replayed_rows(const ViewAheadResult& r) {
     const double none = std::numeric_limits<double>::quiet_NaN();
     text +=
         fmt::format("{} {:42}{}   {}{:9}\n", shown ? '*' : ' ', fmt::format("{}-{} m", shell.from, shell.to),
-                    percent(shell.frames > 0 ? shell.known_free : none),
-                    percent(shell.frames > 0 ? shell.called_occupied : none), shell.frames);
+                    percent_cell(shell.frames > 0 ? shell.known_free : none),
+                    percent_cell(shell.frames > 0 ? shell.called_occupied : none), shell.frames);
   }
   text += fmt::format("\nKnown-free reach of a sphere of 0.35 m, {} frames{:13}{:>10}{:>10}\n",
                       r.reach.frames, "", "10 %", "median");
@@ -170,7 +171,7 @@ Json json_of(const ViewAheadResult& r) {
 }  // namespace
 
 std::string to_table(const MapAccuracy& a) {
-  std::string text = head(a) + end_of_flight(a);
+  std::string text = heading(a) + flight_end_rows(a);
   text += ahead_title(a.ahead, "at the end of the flight") + ahead_rows(a.ahead);
   if (a.replayed) text += replayed_rows(*a.replayed);
   return text;

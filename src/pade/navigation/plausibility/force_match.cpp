@@ -1,4 +1,4 @@
-#include "pade/navigation/force_match.hpp"
+#include "pade/navigation/plausibility/force_match.hpp"
 
 #include <algorithm>
 #include <cmath>

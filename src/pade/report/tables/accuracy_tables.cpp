@@ -1,4 +1,4 @@
-#include "pade/report/accuracy_tables.hpp"
+#include "pade/report/tables/accuracy_tables.hpp"
 
 #include <cmath>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "pade/report/result_table.hpp"
+#include "pade/report/tables/result_table.hpp"
 
 #include <limits>
 

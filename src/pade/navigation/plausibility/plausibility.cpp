@@ -1,4 +1,4 @@
-#include "pade/navigation/plausibility.hpp"
+#include "pade/navigation/plausibility/plausibility.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "pade/navigation/force_match.hpp"
+#include "pade/navigation/plausibility/force_match.hpp"
 
 namespace pade::navigation {
 namespace {

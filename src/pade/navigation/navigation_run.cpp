@@ -1,0 +1,93 @@
+#include "pade/navigation/navigation_run.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "pade/navigation/replay.hpp"
+
+namespace pade {
+namespace {
+
+using navigation::Answer;
+
+std::vector<Time> regular_times(const NavigationLog& log, double rate) {
+  std::vector<Time> times;
+  if (log.imu.empty() || !(rate > 0)) return times;
+  const auto [first, last] = std::minmax_element(
+      log.imu.begin(), log.imu.end(), [](const ImuSample& a, const ImuSample& b) { return a.time < b.time; });
+  const auto step = Time::from_seconds(1 / rate).nanoseconds;
+  for (Time t = first->time; t <= last->time; t.nanoseconds += step) times.push_back(t);
+  return times;
+}
+
+/// The longest run of motions each of which begins where the one before ends; the first of equal ones.
+std::span<const FrameMotion> longest_chain(std::span<const FrameMotion> motions) {
+  std::span<const FrameMotion> longest;
+  for (std::size_t begin = 0; begin < motions.size();) {
+    std::size_t end = begin + 1;
+    while (end < motions.size() && motions[end].t1 == motions[end - 1].t2) ++end;
+    if (end - begin > longest.size()) longest = motions.subspan(begin, end - begin);
+    begin = end;
+  }
+  return longest;
+}
+
+}  // namespace
+
+NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOptions& options) {
+  NavigationRun run;
+  navigation::Navigator navigator(options.navigator);
+  navigator.on_retired([&run](const navigation::Measurement& m) { run.measurements.push_back(m); });
+  std::vector<Time> frames = options.frames.empty() ? regular_times(log, options.rate) : options.frames;
+  std::sort(frames.begin(), frames.end());
+  navigation::ReplayOptions replay;
+  if (options.heading) replay.headings.push_back(*options.heading);
+  if (options.on_road) replay.road_rate = 5;
+
+  const auto offset = Time::from_seconds(options.navigator.camera_time_offset).nanoseconds;
+  std::size_t next = 0;
+  navigation::replay(log, navigator, replay, [&](Time now) {
+    for (; next < frames.size() && frames[next].nanoseconds + offset <= now.nanoseconds; ++next) {
+      const Time t = frames[next];
+      const auto pose = navigator.absolute_pose(t);
+      if (pose.answer != Answer::valid) {
+        ++run.frames_without_answer;
+        continue;
+      }
+      if (next > 0 && !run.frames.empty() && run.frames.back().time == frames[next - 1]) {
+        const auto motion = navigator.relative_pose(frames[next - 1], t, options.T_body_camera);
+        if (motion.answer == Answer::valid) run.motions.push_back({frames[next - 1], t, motion});
+      }
+      run.frames.push_back({t, pose, navigator.health().status});
+    }
+  });
+  run.frames_without_answer += frames.size() - next;
+  run.health = navigator.health();
+  run.sensors = navigation::summarise(run.measurements);
+  return run;
+}
+
+CameraTrajectory camera_trajectory(const NavigationRun& run, const Pose& T_body_camera) {
+  CameraTrajectory trajectory;
+  trajectory.health = run.health;
+  const std::span<const FrameMotion> chain = longest_chain(run.motions);
+  if (!chain.empty()) {
+    const Time start = chain.front().t1;
+    const auto first = std::find_if(run.frames.begin(), run.frames.end(),
+                                    [&](const NavigationFrame& frame) { return frame.time == start; });
+    trajectory.times = {start};
+    trajectory.poses = {camera_pose(first->pose.T_world_body, T_body_camera)};
+    trajectory.frames_left = run.frames.size() - chain.size() - 1;
+  }
+  for (const FrameMotion& m : chain) {
+    const Pose step{Eigen::Quaterniond(m.pose.motion.R_reference_other), m.pose.motion.t_reference_other};
+    trajectory.times.push_back(m.t2);
+    trajectory.poses.push_back(trajectory.poses.back() * step);
+    trajectory.motions.push_back(m.pose.motion);
+    trajectory.scale_valid.push_back(m.pose.scale_valid);
+    trajectory.direction_valid.push_back(m.pose.direction_valid);
+  }
+  return trajectory;
+}
+
+}  // namespace pade

@@ -1,0 +1,93 @@
+#include "pade/pipeline/poses_from_sensors.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "pade/pipeline/checked_log.hpp"
+
+namespace pade {
+
+Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
+                                                         const std::vector<Time>& frames,
+                                                         const CameraMounting& mounting,
+                                                         const navigation::NavigatorOptions& options) {
+  const auto checked = read_checked_log(folder);
+  if (!checked) return checked.error();
+  const NavigationLog* const log = &checked->log;
+  if (log->gnss.velocities.empty() || log->gnss.fixes.empty()) {
+    return Error{fmt::format("{}: no GNSS positions and velocities found, expected them in gnss.csv",
+                             folder.string())};
+  }
+  NavigationRunOptions run_options;
+  run_options.navigator = options;
+  run_options.navigator.camera_time_offset = mounting.time_offset.value_or(options.camera_time_offset);
+  run_options.navigator.gnss_lever_arm =
+      mounting.gnss_lever_arm.value_or(log->gnss.lever_arm.value_or(options.gnss_lever_arm));
+  run_options.frames = frames;
+  run_options.T_body_camera = mounting.T_body_camera;
+  const NavigationRun run = run_navigation(*log, run_options);
+
+  CameraTrajectory trajectory = camera_trajectory(run, mounting.T_body_camera);
+  trajectory.origin = log->gnss.origin;
+  trajectory.hints = all_hints(*checked, run);
+  if (trajectory.times.empty()) return never_aligned(folder.string(), *checked, run);
+  return trajectory;
+}
+
+std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
+  std::vector<std::string> notes;
+  for (const Hint& hint : trajectory.hints)
+    notes.push_back(fmt::format("{} -> {}", hint.message, hint.advice));
+  const auto motions = trajectory.motions.size();
+  const auto false_of = [](const std::vector<bool>& flags) {
+    return std::count(flags.begin(), flags.end(), false);
+  };
+  if (const auto doubtful = false_of(trajectory.scale_valid); doubtful > 0) {
+    notes.push_back(
+        fmt::format("{} of {} motions between frames are too short for what the filter knows of their length "
+                    "(scale_valid false)",
+                    doubtful, motions));
+  }
+  if (const auto doubtful = false_of(trajectory.direction_valid); doubtful > 0) {
+    notes.push_back(
+        fmt::format("{} of {} motions between frames have a direction that the filter hardly knows "
+                    "(direction_valid false)",
+                    doubtful, motions));
+  }
+  if (trajectory.frames_left > 0) {
+    notes.push_back(fmt::format(
+        "the filter had to start anew: {} frames with a pose of their own are left out, the {} of the "
+        "longest unbroken chain are kept",
+        trajectory.frames_left, trajectory.times.size()));
+  }
+  return notes;
+}
+
+io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) {
+  return [options](const std::filesystem::path& folder, const std::vector<Time>& images,
+                   const io::Calibration& calibration) -> Result<io::ComputedPoses> {
+    if (!calibration.T_body_camera) {
+      return Error{
+          fmt::format("{}: field T_body_camera is missing in the calibration, expected it because the poses "
+                      "come from the "
+                      "body's sensors",
+                      folder.string())};
+    }
+    const CameraMounting mounting{*calibration.T_body_camera, calibration.time_offset_s,
+                                  calibration.gnss_lever_arm};
+    const auto trajectory = camera_trajectory_from_imu_gnss(folder, images, mounting, options);
+    if (!trajectory) return trajectory.error();
+    io::ComputedPoses result;
+    for (std::size_t i = 0; i < trajectory->times.size(); ++i) {
+      result.poses.push_back({trajectory->times[i], trajectory->poses[i]});
+      result.covariances.push_back(i > 0 ? trajectory->motions[i - 1].covariance : Matrix6d::Zero());
+    }
+    result.motions_without_scale = static_cast<std::size_t>(
+        std::count(trajectory->scale_valid.begin(), trajectory->scale_valid.end(), false));
+    result.notes = notes_on(*trajectory);
+    return result;
+  };
+}
+
+}  // namespace pade

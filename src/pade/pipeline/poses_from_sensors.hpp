@@ -1,0 +1,41 @@
+// The way from a sequence's imu.csv and gnss.csv to camera poses.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pade/core/result.hpp"
+#include "pade/io/sequence/sequence.hpp"
+#include "pade/navigation/navigation_run.hpp"
+
+namespace pade {
+
+/// What of a camera's calibration matters here.
+struct CameraMounting {
+  Pose T_body_camera;
+  std::optional<double> time_offset;              ///< t_imu = t_image + offset, s; else what the options say
+  std::optional<Eigen::Vector3d> gnss_lever_arm;  ///< body, m; else what the GNSS log says
+};
+
+/// Runs the filter on imu.csv and gnss.csv (and baro.csv, mag.csv) of a sequence folder and chains its
+/// motions (camera_trajectory()). Frames before the filter knows its yaw have no pose. Errors: a log that
+/// cannot be read; no frame with a pose.
+Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
+                                                         const std::vector<Time>& frames,
+                                                         const CameraMounting& mounting,
+                                                         const navigation::NavigatorOptions& options = {});
+
+/// What a person should know of the trajectory: motions of doubtful length and direction, and frames left
+/// out.
+std::vector<std::string> notes_on(const CameraTrajectory& trajectory);
+
+/// What `--poses from-imu-gnss` is called in options and runs.
+inline constexpr const char* poses_from_sensors = "from-imu-gnss";
+
+/// The same as a source of poses for io::Sequence. Errors: those of the function above; no GNSS data; a
+/// calibration without T_body_camera.
+io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options);
+
+}  // namespace pade
