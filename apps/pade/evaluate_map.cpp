@@ -117,6 +117,7 @@ Result<OpenRun> open_run(const std::string& folder, const EvaluateMapArguments& 
   const fs::path source = arguments.sequence.empty() ? run->info.sequence : fs::path(arguments.sequence);
   io::SequenceOptions true_options = options->sequence;
   true_options.poses = "groundtruth";
+  true_options.origin = "none";  // truth is compared in the coordinates of the world
   auto sequence = io::Sequence::open(source, true_options);
   if (!sequence) {
     return Error{
@@ -158,7 +159,9 @@ Status measure_maps(const OpenRun& run, const KnownWorld& world, const EvaluateM
     return Error{fmt::format("{}: found no such file, expected the map", map_file.string())};
   const auto map = io::read_map(map_file, run.options.mapper.map);
   if (!map) return map.error();
-  const Pose T_map_world = accuracy.alignment ? accuracy.alignment->T_map_world : Pose{};
+  const Pose T_map_world = accuracy.alignment
+                               ? accuracy.alignment->T_map_world
+                               : Pose{Eigen::Quaterniond::Identity(), -run.run.info.local_origin};
   const evaluation::PlacedSurface in_map(world.truth.surface, T_map_world);
   const evaluation::PlacedSurface in_world(world.truth.surface);
   evaluation::SeenSurface seen(accuracy.voxel, accuracy.seen_depth);

@@ -40,6 +40,8 @@ struct Arguments {
   std::string path;
   std::string poses = "groundtruth";
   std::string world_up;
+  std::string calibration;
+  int camera = 0;
   int step = 1;
   bool json = false;
 };
@@ -130,6 +132,7 @@ Json json_of(const io::Sequence& sequence, const SequenceCheck& check) {
                {"truth", nullptr},
                {"world_up", nullptr},
                {"geographic_origin", nullptr},
+               {"local_origin_m", json_of(sequence.local_origin())},
                {"poses", json_of(check.poses)},
                {"warnings", check.warnings},
                {"notes", sequence.notes()},
@@ -179,7 +182,8 @@ void print_sequence(const io::Sequence& sequence, const SequenceCheck& check) {
          check.truth_depth->least, check.truth_depth->most);
   }
   if (const auto& up = sequence.world_up()) {
-    line("up", "{} ({}{})", direction_text(up->direction), up->stated ? "stated" : "guessed from the cameras",
+    line("up", "{} ({}{})", direction_text(up->direction),
+         up->stated ? std::string("stated") : "guessed from " + up->source,
          check.up_disagreement
              ? fmt::format("; cameras' mean up {:.0f} deg from it", *check.up_disagreement * kDegrees)
              : "");
@@ -257,6 +261,8 @@ Status inform_of_sequence(const Arguments& arguments) {
   io::SequenceOptions options;
   options.poses = arguments.poses;
   options.world_up = arguments.world_up;
+  options.calibration = arguments.calibration;
+  options.camera = arguments.camera;
   const Result<io::Sequence> sequence = io::Sequence::open(arguments.path, options);
   if (!sequence) {
     const std::vector<io::Sequence> below = sequences_in(arguments.path, options);
@@ -288,6 +294,7 @@ Status inform_of_map(const Arguments& arguments) {
   const double occupied = static_cast<double>(counts.occupied) * cube;
   const double free = static_cast<double>(counts.free) * cube;
   const Eigen::AlignedBox3d bounds = map->bounds();
+  const Eigen::Vector3d origin = io::local_origin_of(arguments.path);
   if (arguments.json) {
     Json json = {{"kind", "map"},
                  {"file", arguments.path},
@@ -297,6 +304,7 @@ Status inform_of_map(const Arguments& arguments) {
                  {"free_voxels", counts.free},
                  {"occupied_m3", occupied},
                  {"free_m3", free},
+                 {"local_origin_m", json_of(origin)},
                  {"bounds_m", nullptr}};
     if (!bounds.isEmpty())
       json["bounds_m"] = {{"from", json_of(bounds.min())}, {"to", json_of(bounds.max())}};
@@ -308,6 +316,63 @@ Status inform_of_map(const Arguments& arguments) {
   line("occupied", "{} voxels, {:.3f} m3", counts.occupied, occupied);
   line("free", "{} voxels, {:.3f} m3", counts.free, free);
   if (!bounds.isEmpty()) line("bounds", "{} to {} m", vector_text(bounds.min()), vector_text(bounds.max()));
+  if (!origin.isZero(0))
+    line("local origin", "{} {} {}: add it to get back to the coordinates of the poses", origin.x(),
+         origin.y(), origin.z());
+  return {};
+}
+
+Json json_of(const io::Calibration& calibration) {
+  Json json = {{"kind", "calibration"},    {"dialect", calibration.format},
+               {"camera", nullptr},        {"T_body_camera", nullptr},
+               {"time_offset_s", nullptr}, {"ignored", calibration.unknown_fields}};
+  if (const auto& camera = calibration.camera) {
+    json["camera"] = {{"width", camera->width},
+                      {"height", camera->height},
+                      {"fx", camera->fx},
+                      {"fy", camera->fy},
+                      {"cx", camera->cx},
+                      {"cy", camera->cy},
+                      {"distortion_model", io::lens_name(camera->distortion)},
+                      {"distortion", camera->coefficients}};
+  }
+  if (const auto& mounting = calibration.T_body_camera) {
+    const Eigen::Matrix3d R = mounting->matrix3();
+    json["T_body_camera"] = {{"rotation_by_rows", Json::array()},
+                             {"translation_m", json_of(mounting->translation)}};
+    for (int i = 0; i < 9; ++i) json["T_body_camera"]["rotation_by_rows"].push_back(R(i / 3, i % 3));
+  }
+  if (calibration.time_offset_s) json["time_offset_s"] = *calibration.time_offset_s;
+  return json;
+}
+
+Status inform_of_calibration(const Arguments& arguments) {
+  const auto calibration = io::read_calibration(arguments.path, arguments.camera);
+  if (!calibration) return calibration.error();
+  if (!calibration->camera)
+    return Error{
+        fmt::format("{}: found no camera in it, expected a calibration (known dialects: docs/formats.md) or "
+                    "a map (.bt, .ot)",
+                    arguments.path)};
+  if (arguments.json) {
+    fmt::print("{}\n", json_of(*calibration).dump(2));
+    return {};
+  }
+  const Camera& camera = *calibration->camera;
+  fmt::print("{}: calibration of a camera, {}\n", arguments.path, calibration->format);
+  const std::string size = camera.width > 0 ? fmt::format("{} x {}", camera.width, camera.height)
+                                            : "size not stated (the images')";
+  line("camera", "{}, f = {:.2f} {:.2f}, c = {:.2f} {:.2f}", size, camera.fx, camera.fy, camera.cx,
+       camera.cy);
+  line("lens", "{} {}", io::lens_name(camera.distortion), fmt::join(camera.coefficients, " "));
+  if (const auto& mounting = calibration->T_body_camera) {
+    const Eigen::Matrix3d R = mounting->matrix3();
+    line("mounting", "camera at {} of the body, looking along {}, its right along {}",
+         vector_text(mounting->translation), vector_text(R.col(2)), vector_text(R.col(0)));
+  }
+  if (calibration->time_offset_s)
+    line("time", "clock of the poses - clock of the images = {:g} s", *calibration->time_offset_s);
+  for (const std::string& field : calibration->unknown_fields) line("ignored", "{}", field);
   return {};
 }
 
@@ -332,6 +397,9 @@ void print_run(const io::Run& run, const std::optional<evaluation::DepthAccuracy
   if (info.origin)
     line("origin", "latitude {:.7f}, longitude {:.7f}, height {:.2f} m", info.origin->latitude_deg,
          info.origin->longitude_deg, info.origin->height);
+  if (!info.local_origin.isZero(0))
+    line("local origin", "{} {} {}: add it to get back to the coordinates of the poses",
+         info.local_origin.x(), info.local_origin.y(), info.local_origin.z());
   if (info.map)
     line("map", "{} occupied and {} free voxels of {:g} m", info.map->occupied_voxels, info.map->free_voxels,
          info.map->voxel);
@@ -372,10 +440,14 @@ Status inform(const Arguments& arguments) {
   const fs::path path = arguments.path;
   std::error_code code;
   if (!fs::exists(path, code)) {
-    return Error{fmt::format("{}: found nothing there, expected a sequence, a map (.bt, .ot) or a run",
-                             arguments.path)};
+    return Error{
+        fmt::format("{}: found nothing there, expected a sequence, a map (.bt, .ot), a calibration or a run",
+                    arguments.path)};
   }
-  if (!fs::is_directory(path, code)) return inform_of_map(arguments);
+  if (!fs::is_directory(path, code)) {
+    const bool map = path.extension() == ".bt" || path.extension() == ".ot";
+    return map ? inform_of_map(arguments) : inform_of_calibration(arguments);
+  }
   return fs::exists(path / "run.json", code) ? inform_of_run(arguments) : inform_of_sequence(arguments);
 }
 
@@ -393,13 +465,22 @@ void add_info(CLI::App& app, Context& context) {
       "  pade info flight/          before mapping it\n"
       "  pade info flights/         a folder of sequences: how hard the scene of each is, and of all\n"
       "  pade info out/flight       how a run went\n"
-      "  pade info out/flight/map.bt\n");
-  command->add_option("PATH", arguments->path, "Sequence, folder of sequences, map (.bt, .ot) or run")
+      "  pade info out/flight/map.bt\n"
+      "  pade info camchain.yaml --camera 1     what is understood of a calibration\n");
+  command
+      ->add_option("PATH", arguments->path,
+                   "Sequence, folder of sequences, map (.bt, .ot), calibration or run")
       ->required();
   command->add_option("--poses", arguments->poses, "groundtruth, original or a pose file")
       ->capture_default_str();
   command->add_option("--world-up", arguments->world_up,
                       "Axis of the pose world that points up: +x -x +y -y +z -z");
+  command->add_option("--calibration", arguments->calibration,
+                      "Calibration file instead of the sequence's own (docs/formats.md)");
+  command
+      ->add_option("--camera", arguments->camera,
+                   "Which camera of a calibration file that holds several, from 0")
+      ->check(CLI::Range(0, 99));
   command->add_option("--step", arguments->step, "Look at each frame and the k-th before it")
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print JSON");

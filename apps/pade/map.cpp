@@ -32,17 +32,18 @@ struct MapArguments {
   bool strict = false;
   bool json = false;
   bool pcd = false;
+  bool world_coordinates = false;
   bool no_report = false;
   int threads = 1;
 
-  std::optional<std::string> flow, poses, calibration, world_up, refine_motion;
+  std::optional<std::string> flow, poses, calibration, world_up, origin, refine_motion;
   std::optional<depth::Method> method;
   std::optional<depth::Model> model;
   std::optional<depth::Reading> reading;
   std::optional<depth::Derotation> derotate;
   std::optional<depth::Gates> gates;
   std::optional<Order> order;
-  std::optional<int> window, step, longest_step;
+  std::optional<int> window, step, longest_step, camera;
   std::optional<double> range, voxel, map_range;
   std::optional<navigation::ImuClass> imu;
 };
@@ -79,8 +80,11 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.poses, arguments.poses);
   set(options.sequence.calibration, arguments.calibration);
   set(options.sequence.world_up, arguments.world_up);
+  set(options.sequence.origin, arguments.origin);
+  set(options.sequence.camera, arguments.camera);
   if (arguments.imu) set_imu(options, *arguments.imu);
   options.sequence.strict = options.sequence.strict || arguments.strict;
+  options.world_coordinates = options.world_coordinates || arguments.world_coordinates;
   options.pcd = options.pcd || arguments.pcd;
   options.report = options.report && !arguments.no_report;
   return options;
@@ -133,6 +137,9 @@ void print_table(const MapArguments& arguments, const MapResult& result) {
   if (info.map) {
     fmt::print("{:14} {} occupied and {} free voxels of {} m\n", "Map", info.map->occupied_voxels,
                info.map->free_voxels, info.map->voxel);
+    if (info.map->points_outside > 0) {
+      fmt::print("{:14} {} points lie outside of what the map can hold\n", "", info.map->points_outside);
+    }
   }
   fmt::print("{}", evaluation::to_table(info.hints));
   if (!result.timing.stages.empty()) {
@@ -222,6 +229,14 @@ void add_map(CLI::App& app, Context& context) {
   add_enum(*map, "--imu", a->imu, "class of the IMU, for --poses from-imu-gnss (default industrial)");
   map->add_option("--calibration", a->calibration, "calibration file instead of the sequence's own");
   map->add_option("--world-up", a->world_up, "axis of the pose world that points up: +x -x +y -y +z -z");
+  map->add_option("--camera", a->camera, "which camera of a calibration file that holds several, from 0")
+      ->check(CLI::Range(0, 99));
+  map->add_option(
+      "--origin", a->origin,
+      "point of the pose world that is 0 0 0 of the run: auto (default: near the flight where that\n"
+      "is farther than 1 km from 0 0 0, as in UTM), flight, none, or \"x y z\"");
+  map->add_flag("--world-coordinates", a->world_coordinates,
+                "also write cloud and trajectory in the coordinates of the poses (cloud_world.ply ...)");
   map->add_option("--save", a->save, "image stacks to write: any of depth,sigma,state,bound,flow");
   map->add_option("--config", a->config, "YAML file with options as run.json echoes them");
   map->add_option("--threads", a->threads, "2 reads ahead; the result is the same")

@@ -9,10 +9,14 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "pade/checks/run_hints.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
+#include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
+#include "pade/io/world.hpp"
 #include "pade/navigation/navigation_run.hpp"
+#include "pade/pipeline/checked_log.hpp"
 #include "pade/report/navigation_report.hpp"
 
 #include "commands.hpp"
@@ -34,10 +38,40 @@ struct Arguments {
   double gravity = 9.80665;
   double heading = 0;
   double heading_sigma = 2;
+  double gnss_latency = 0, velocity_latency = 0, barometer_latency = 0, magnetometer_latency = 0;
+  double declination = 0;
+  std::string lever_arm;
+  std::string calibration;
+  int camera = 0;
+  CLI::Option* velocity_latency_given = nullptr;
   CLI::Option* heading_given = nullptr;
   bool force = false;
   bool json = false;
 };
+
+/// Lever arm, and what a calibration says of where the camera sits.
+Status set_mounting(const Arguments& arguments, NavigationRunOptions& options) {
+  if (!arguments.calibration.empty()) {
+    const auto calibration = io::read_calibration(arguments.calibration, arguments.camera);
+    if (!calibration) return calibration.error();
+    if (!calibration->T_body_camera) {
+      return Error{
+          fmt::format("{}: found no mounting of the camera in it, expected T_body_camera, T_BS or T_cam_imu",
+                      arguments.calibration)};
+    }
+    options.T_body_camera = *calibration->T_body_camera;
+    options.navigator.camera_time_offset = calibration->time_offset_s.value_or(0);
+    if (calibration->gnss_lever_arm) options.navigator.gnss_lever_arm = *calibration->gnss_lever_arm;
+  }
+  if (arguments.lever_arm.empty()) return {};
+  const auto arm = io::parse_point(arguments.lever_arm);
+  if (!arm) {
+    return Error{fmt::format("--lever-arm: found {}, expected \"x,y,z\" in metres, forward, left, up",
+                             io::in_quotes(arguments.lever_arm))};
+  }
+  options.navigator.gnss_lever_arm = *arm;
+  return {};
+}
 
 Result<NavigationRunOptions> run_options(const Arguments& arguments, const NavigationLog& log) {
   NavigationRunOptions options;
@@ -47,6 +81,13 @@ Result<NavigationRunOptions> run_options(const Arguments& arguments, const Navig
       from_name<navigation::ImuClass>(arguments.imu).value_or(navigation::ImuClass::industrial));
   options.navigator.filter.gravity = arguments.gravity;
   options.navigator.gnss_lever_arm = log.gnss.lever_arm.value_or(Eigen::Vector3d::Zero());
+  if (const Status mounted = set_mounting(arguments, options); !mounted) return mounted.error();
+  options.navigator.gnss_position_latency = arguments.gnss_latency;
+  options.navigator.gnss_velocity_latency =
+      arguments.velocity_latency_given->count() > 0 ? arguments.velocity_latency : arguments.gnss_latency;
+  options.navigator.barometer_latency = arguments.barometer_latency;
+  options.navigator.magnetometer_latency = arguments.magnetometer_latency;
+  options.navigator.declination = arguments.declination * kDegree;
   if (arguments.heading_given->count() > 0 && !log.imu.empty()) {
     options.heading =
         Heading{log.imu.front().time, arguments.heading * kDegree, arguments.heading_sigma * kDegree};
@@ -64,7 +105,21 @@ Result<NavigationRunOptions> run_options(const Arguments& arguments, const Navig
 
 using Score = std::optional<evaluation::MotionSummary>;
 
-nlohmann::json summary(const NavigationRun& run, const Score& score) {
+nlohmann::json summary(const NavigationRun& run, const Score& score, const std::vector<Hint>& hints) {
+  nlohmann::json sensors = nlohmann::json::array();
+  for (const auto& sensor : run.sensors) {
+    sensors.push_back({{"sensor", sensor.sensor},
+                       {"measurements", sensor.measurements},
+                       {"refused", sensor.refused},
+                       {"chi_square_per_component", sensor.chi_square}});
+  }
+  nlohmann::json list = nlohmann::json::array();
+  for (const Hint& hint : hints) {
+    list.push_back({{"id", hint.id},
+                    {"severity", std::string(to_name(hint.severity))},
+                    {"message", hint.message},
+                    {"advice", hint.advice}});
+  }
   nlohmann::json json = {{"status", std::string(to_name(run.health.status))},
                          {"frames", run.frames.size()},
                          {"frames_without_answer", run.frames_without_answer},
@@ -73,7 +128,9 @@ nlohmann::json summary(const NavigationRun& run, const Score& score) {
                          {"measurements_too_late", run.health.too_late},
                          {"measurements_repeated", run.health.duplicates},
                          {"measurements_unusable", run.health.unusable},
-                         {"restarts", run.health.restarts}};
+                         {"restarts", run.health.restarts},
+                         {"sensors", std::move(sensors)},
+                         {"hints", std::move(list)}};
   if (score) {
     json["against_truth"] = {{"pairs", score->pairs},
                              {"translation_median_m", score->translation_median},
@@ -98,19 +155,16 @@ Status navigate(const Arguments& arguments) {
   if (!output) return output.error();
   io::NavigationLogOptions log_options;
   log_options.gnss = arguments.gnss;
-  const auto log = io::read_navigation_log(arguments.log, log_options);
-  if (!log) return log.error();
+  const auto checked = read_checked_log(arguments.log, log_options);
+  if (!checked) return checked.error();
+  const NavigationLog* const log = &checked->log;
   const auto options = run_options(arguments, *log);
   if (!options) return options.error();
   const NavigationRun run = run_navigation(*log, *options);
-  if (run.frames.empty()) {
-    return Error{fmt::format(
-        "{}: the filter never found its attitude and yaw (status: {}), expected two seconds at rest and "
-        "a heading, or GNSS velocities of a vehicle that accelerates",
-        arguments.log, to_name(run.health.status))};
-  }
+  if (run.frames.empty()) return never_aligned(arguments.log, *checked, run);
+  const std::vector<Hint> hints = all_hints(*checked, run);
   const Score score = score_motions(*log, *options, run);
-  nlohmann::json json = summary(run, score);
+  nlohmann::json json = summary(run, score, hints);
   json["remarks"] = log->remarks;
   const std::string title = "Navigation of " + std::filesystem::path(arguments.log).filename().string();
   for (const auto& [file, content] :
@@ -125,9 +179,14 @@ Status navigate(const Arguments& arguments) {
     fmt::print("{}\n", json.dump(2));
     return {};
   }
+  fmt::print("{}", evaluation::to_table(hints));
   for (const std::string& remark : log->remarks) fmt::print("{}\n", remark);
   fmt::print("{} frames, {} without a pose; status at the end: {}\n", run.frames.size(),
              run.frames_without_answer, to_name(run.health.status));
+  for (const auto& sensor : run.sensors) {
+    fmt::print("{}: {} measurements, {} refused, mean χ² {:.2f} per component (1 is consistent)\n",
+               sensor.sensor, sensor.measurements, sensor.refused, sensor.chi_square);
+  }
   if (score) {
     fmt::print(
         "against truth, frame to frame: translation {:.2f} cm median, {:.2f} cm 95 % (NEES {:.2f}); rotation "
@@ -144,7 +203,9 @@ Status navigate(const Arguments& arguments) {
 void add_navigate(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("navigate", "Trajectory and frame-to-frame motion from IMU and GNSS");
   auto arguments = std::make_shared<Arguments>();
-  command->add_option("log", arguments->log, "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export")
+  command
+      ->add_option("log", arguments->log,
+                   "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md)")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, where there are several");
@@ -166,6 +227,29 @@ void add_navigate(CLI::App& app, Context& context) {
                                                  "Known yaw at the start, degrees from east towards north");
   command->add_option("--heading-sigma", arguments->heading_sigma, "Its standard deviation, degrees")
       ->capture_default_str();
+  command
+      ->add_option("--gnss-latency", arguments->gnss_latency, "Seconds that the stamps of the GNSS are late")
+      ->capture_default_str()
+      ->check(CLI::Range(-100.0, 100.0));
+  arguments->velocity_latency_given =
+      command
+          ->add_option("--gnss-velocity-latency", arguments->velocity_latency,
+                       "The same of its velocities, where they differ from the positions")
+          ->check(CLI::Range(-100.0, 100.0));
+  command->add_option("--baro-latency", arguments->barometer_latency, "The same of the barometer")
+      ->check(CLI::Range(-100.0, 100.0));
+  command->add_option("--mag-latency", arguments->magnetometer_latency, "The same of the magnetometer")
+      ->check(CLI::Range(-100.0, 100.0));
+  command->add_option("--lever-arm", arguments->lever_arm,
+                      "Antenna in the body frame, \"x,y,z\": forward, left, up, m (else what the logs say)");
+  command
+      ->add_option("--declination", arguments->declination,
+                   "Of magnetic north, from north towards east, degrees")
+      ->check(CLI::Range(-180.0, 180.0));
+  command->add_option(
+      "--calibration", arguments->calibration,
+      "Calibration whose camera the motions are of: its mounting and time offset (else the body's)");
+  command->add_option("--camera", arguments->camera, "Which camera of it, from 0")->check(CLI::Range(0, 99));
   command->add_flag("--force", arguments->force, "Replace an earlier output");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->callback([arguments, &context] {

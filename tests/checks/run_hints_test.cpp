@@ -118,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(
                                empty(run);
                                run.map->points_outside = 400;
                              },
-                             "empty-map", "reaches 3277 m", "subtract a constant"},
+                             "empty-map", "reaches 3277 m", "--origin flight"},
                     HintCase{"Scattered",
                              [](io::RunInfo& run) {
                                empty(run);
@@ -156,7 +156,7 @@ INSTANTIATE_TEST_SUITE_P(
                     HintCase{"LargeMask", [](io::RunInfo& run) { run.masked_share = 0.6; }, "large-mask",
                              "60 %", "mask.png"},
                     HintCase{"SomeOutside", [](io::RunInfo& run) { run.map->points_outside = 100; },
-                             "outside-map", "22 % of the points", "subtract a constant"},
+                             "outside-map", "22 % of the points", "--origin flight"},
                     HintCase{"MostlyUncertain", [](io::RunInfo& run) { run.map->depths_uncertain = 600; },
                              "mostly-uncertain", "92 % of the depths", "--step"},
                     HintCase{"BeyondTheMap",
@@ -166,7 +166,7 @@ INSTANTIATE_TEST_SUITE_P(
                              },
                              "beyond-map", "71 % of the depths", "--map-range"},
                     HintCase{"NothingFree", [](io::RunInfo& run) { run.map->free_voxels = 0; },
-                             "nothing-free", "no free space", "--flow"},
+                             "nothing-free", "no free space", "pade info"},
                     HintCase{"FramesWithoutPose",
                              [](io::RunInfo& run) {
                                run.health.frames_used = 30;

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pade/io/sequence/dialects/pose_dialects.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 
@@ -44,13 +45,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const std::string_view text(reinterpret_cast<const char*>(data) + 1, size - 1);
   ReadReport report;
-  switch (data[0] % 3) {
+  switch (data[0] % 4) {
     case 0:
       check(pade::io::parse_trajectory(text, "input", report));
       break;
     case 1:
       check(pade::io::parse_euroc_poses(text, "input", report));
       break;
+    case 2: {
+      const std::vector<pade::Time> images = {pade::Time{0}, pade::Time{7}, pade::Time{5}};
+      check(pade::io::parse_any_poses(text, "input", images, report));
+      break;
+    }
     default:
       check(pade::io::parse_kitti_poses(text, "input",
                                         {pade::Time{0}, pade::Time{7}, std::nullopt, pade::Time{5}}, report));

@@ -179,5 +179,41 @@ TEST_F(MapSequence, AnExistingRunIsNotTouched) {
   EXPECT_EQ(content("run"), before);
 }
 
+TEST_F(MapSequence, AFlightInMapCoordinatesGivesTheSameMapAroundARecordedOrigin) {
+  MapSequenceOptions options;
+  options.report = false;
+  options.sequence.origin = "flight";
+  const auto zero = map("zero", options);
+  ASSERT_TRUE(zero) << zero.error().message;
+  io::ReadReport report;
+  auto poses = io::read_trajectory(sequence() / "groundtruth.txt", report);
+  ASSERT_TRUE(poses);
+  const Eigen::Vector3d shift(482913, 4649776, 120);
+  std::ofstream(sequence() / "groundtruth.txt") << io::format_trajectory(
+      poses->transformed(Pose{Eigen::Quaterniond::Identity(), shift}, Pose{}).rows());
+  options.sequence.origin = "auto";
+  options.world_coordinates = true;
+  options.pcd = true;
+  const auto utm = map("utm", options);
+  ASSERT_TRUE(utm) << utm.error().message;
+  EXPECT_EQ(utm->info.local_origin, zero->info.local_origin + shift);
+  // Positions of seven digits have lost some of theirs: a point on the border of a voxel may fall beside it.
+  const auto occupied = static_cast<double>(zero->info.map->occupied_voxels);
+  EXPECT_NEAR(static_cast<double>(utm->info.map->occupied_voxels), occupied, 0.01 * occupied + 2);
+  EXPECT_EQ(utm->info.map->points_outside, 0U);
+  const std::string origin = "local origin 48291";
+  EXPECT_THAT(content_of(root_ / "utm" / "cloud.ply").substr(0, 300), HasSubstr(origin));
+  EXPECT_THAT(content_of(root_ / "utm" / "cloud.pcd").substr(0, 300), HasSubstr(origin));
+  EXPECT_THAT(content_of(root_ / "utm" / "map.json"), HasSubstr("local_origin_m"));
+  EXPECT_THAT(content_of(root_ / "utm" / "cloud_world.ply").substr(0, 300), HasSubstr("property double x"));
+  const auto back = io::read_trajectory(root_ / "utm" / "trajectory_world.txt", report);
+  ASSERT_TRUE(back);
+  EXPECT_LT((back->rows().front().pose.translation - poses->rows().front().pose.translation - shift).norm(),
+            1e-6);
+  const auto read = io::read_run(root_ / "utm");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->info.local_origin, utm->info.local_origin);
+}
+
 }  // namespace
 }  // namespace pade

@@ -152,13 +152,24 @@ struct PairFits {
   double without_motion = 0;
 };
 
+/// The motion that a convention makes of a pair; empty where it needs rows that there are not.
+std::optional<Pose> motion_of(PoseConvention convention, const PoseCheckPair& pair) {
+  const auto& rows = convention == PoseConvention::row_before ? pair.rows_before : pair.rows_after;
+  if (convention == PoseConvention::row_before || convention == PoseConvention::row_after) {
+    if (!rows) return std::nullopt;
+    return relative_pose(PoseConvention::as_given, (*rows)[0], (*rows)[1]);
+  }
+  return relative_pose(convention, pair.first_pose, pair.second_pose);
+}
+
 std::optional<PairFits> fit_pair(const PoseCheckPair& pair, const Camera& camera) {
   PairFits result;
   const std::vector<Track> tracks = pair.depth.empty() ? tracks_of(pair, camera) : std::vector<Track>();
   for (std::size_t i = 0; i < pose_conventions.size(); ++i) {
-    const Pose motion = relative_pose(pose_conventions[i], pair.first_pose, pair.second_pose);
+    const auto motion = motion_of(pose_conventions[i], pair);
+    if (!motion) continue;
     result.fits[i] =
-        pair.depth.empty() ? epipolar_fit(tracks, camera, motion) : photometric_fit(pair, camera, motion);
+        pair.depth.empty() ? epipolar_fit(tracks, camera, *motion) : photometric_fit(pair, camera, *motion);
   }
   result.without_motion =
       pair.depth.empty()
@@ -187,29 +198,65 @@ std::string explain(PoseConvention convention) {
       return "these poses look in another axis convention: body axes x forward, y left, z up (FLU) where the "
              "camera's "
              "x right, y down, z forward is expected";
+    case PoseConvention::scalar_first:
+      return "the quaternions look as if written w x y z where x y z w is expected";
+    case PoseConvention::images_turned:
+      return "the images look turned by 180 degrees: the camera hangs upside down, and poses or images do "
+             "not know it";
+    case PoseConvention::millimetres:
+      return "the positions look like millimetres where metres are expected";
+    case PoseConvention::row_before:
+      return "the poses look one frame late: each image fits the row of the frame before it";
+    case PoseConvention::row_after:
+      return "the poses look one frame early: each image fits the row of the frame after it";
     case PoseConvention::as_given:
       break;
   }
   return "the poses fit the images as given";
 }
 
+/// The convention with the least error. In steady flight neighbouring rows, and near rest every scale,
+/// explain the images as well as the right ones: these count only where they are clearly better.
+const ConventionScore& best_of(const std::vector<ConventionScore>& scores) {
+  const auto needs_clarity = [](PoseConvention convention) {
+    return convention == PoseConvention::row_before || convention == PoseConvention::row_after ||
+           convention == PoseConvention::millimetres;
+  };
+  const ConventionScore* best = &scores.front();
+  for (const ConventionScore& score : scores) {
+    if (!needs_clarity(score.convention) && score.error < best->error) best = &score;
+  }
+  const double least = kClearlyBetter * best->error;
+  for (const ConventionScore& score : scores) {
+    if (needs_clarity(score.convention) && score.error < std::min(least, best->error)) best = &score;
+  }
+  return *best;
+}
+
 void judge(PoseCheck& check) {
-  const auto best = std::min_element(check.scores.begin(), check.scores.end(),
-                                     [](const auto& a, const auto& b) { return a.error < b.error; });
+  const ConventionScore& best = best_of(check.scores);
   const double given = check.scores.front().error;
-  check.best = best->convention;
+  check.best = best.convention;
   // At rest every convention is as good as another.
   const bool moves =
-      check.photometric ? best->visible_error + 0.1 < 0.9 * check.without_motion : check.without_motion > 1;
-  const bool explains = check.photometric || best->positive_depth > 0.5;
-  if (!moves || !explains) {
+      check.photometric ? best.visible_error + 0.1 < 0.9 * check.without_motion : check.without_motion > 1;
+  const bool explains = check.photometric || best.positive_depth > 0.5;
+  constexpr double kWorseThanRest = 1.5;
+  const bool contradicts =
+      check.photometric && check.scores.front().visible_error > kWorseThanRest * check.without_motion;
+  if (!moves && contradicts) {
+    check.sentence =
+        "no convention explains the images: a camera at rest would fit them better than these poses; they "
+        "may be in "
+        "another unit, of another time or of another flight";
+  } else if (!moves || !explains) {
     check.sentence =
         !moves ? "the camera hardly moves between the frames that were tried: the convention cannot be told"
                : "no convention explains the images: the poses may not belong to them";
-  } else if (best->convention == PoseConvention::as_given) {
+  } else if (best.convention == PoseConvention::as_given) {
     check.verdict = PoseCheck::Verdict::good;
     check.sentence = explain(check.best);
-  } else if (best->error < kClearlyBetter * given && best->wins > 0.5) {
+  } else if (best.error < kClearlyBetter * given && best.wins > 0.5) {
     check.verdict = PoseCheck::Verdict::wrong;
     check.sentence = explain(check.best);
   } else {
@@ -222,7 +269,8 @@ void judge(PoseCheck& check) {
 
 std::string_view name_of(PoseConvention convention) {
   constexpr std::array<std::string_view, pose_conventions.size()> names = {
-      "as given", "inverted", "inverse relative", "GL axes", "FRD axes", "FLU axes"};
+      "as given",     "inverted",      "inverse relative", "GL axes",    "FRD axes", "FLU axes",
+      "scalar first", "images turned", "millimetres",      "row before", "row after"};
   return names[static_cast<std::size_t>(convention)];
 }
 
@@ -240,7 +288,23 @@ Pose relative_pose(PoseConvention convention, const Pose& a, const Pose& b) {
       return with_axes(columns(Vector3d::UnitY(), Vector3d::UnitZ(), Vector3d::UnitX()));
     case PoseConvention::flu_axes:
       return with_axes(forward_camera_rotation());
+    case PoseConvention::scalar_first: {
+      const auto reordered = [](const Pose& pose) {
+        const Eigen::Quaterniond& q = pose.rotation;
+        return Pose{Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()), pose.translation};
+      };
+      return reordered(b).inverse() * reordered(a);
+    }
+    case PoseConvention::images_turned:
+      return with_axes(columns(-Vector3d::UnitX(), -Vector3d::UnitY(), Vector3d::UnitZ()));
+    case PoseConvention::millimetres: {
+      Pose motion = b.inverse() * a;
+      motion.translation *= 1e-3;
+      return motion;
+    }
     case PoseConvention::as_given:
+    case PoseConvention::row_before:
+    case PoseConvention::row_after:
       break;
   }
   return b.inverse() * a;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -24,14 +25,22 @@ enum class PoseConvention {
   gl_axes,           ///< camera axes x right, y up, z backward (OpenGL, Blender, NeRF)
   frd_axes,          ///< body axes x forward, y right, z down (AirSim, PX4)
   flu_axes,          ///< body axes x forward, y left, z up (ROS)
+  scalar_first,      ///< quaternions w x y z in place of x y z w
+  images_turned,     ///< the images stand on their head: a camera mounted upside down
+  millimetres,       ///< positions a thousand times too large
+  row_before,        ///< the rows run one frame late: the row of an image is that of the frame before
+  row_after,         ///< and one frame early
 };
-inline constexpr std::array pose_conventions = {PoseConvention::as_given,         PoseConvention::inverted,
-                                                PoseConvention::inverse_relative, PoseConvention::gl_axes,
-                                                PoseConvention::frd_axes,         PoseConvention::flu_axes};
+inline constexpr std::array pose_conventions = {
+    PoseConvention::as_given,     PoseConvention::inverted,      PoseConvention::inverse_relative,
+    PoseConvention::gl_axes,      PoseConvention::frd_axes,      PoseConvention::flu_axes,
+    PoseConvention::scalar_first, PoseConvention::images_turned, PoseConvention::millimetres,
+    PoseConvention::row_before,   PoseConvention::row_after};
 /// "as given", "inverted", ...
 std::string_view name_of(PoseConvention convention);
 
-/// Motion from frame a to frame b (p_b = T_b_a * p_a, optical axes) if the two rows are in `convention`.
+/// Motion from frame a to frame b (p_b = T_b_a * p_a, optical axes) if the two rows are in `convention`; the
+/// rows are those of the frames themselves also for row_before and row_after.
 Pose relative_pose(PoseConvention convention, const Pose& row_a, const Pose& row_b);
 
 /// Two images of a sequence with their rows of the pose file.
@@ -39,6 +48,8 @@ struct PoseCheckPair {
   cv::Mat first, second;  ///< CV_8UC1, undistorted
   Pose first_pose, second_pose;
   cv::Mat depth;  ///< of the first image, CV_32FC1 metres, NaN = none; empty = not known
+  /// The rows of the frames next to the two, first and second; empty where there are none.
+  std::optional<std::array<Pose, 2>> rows_before = {}, rows_after = {};
 };
 
 /// How well one convention explains the images, over all pairs.

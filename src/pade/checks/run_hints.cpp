@@ -21,6 +21,8 @@ constexpr double kHardlyAny = 0.01;     // of the pixels: a map cannot come of t
 constexpr double kMost = 0.5;           // of depths, pairs, frames, points, the image
 constexpr double kManyUncertain = 0.8;  // of the depths
 constexpr double kSomeFrames = 0.1;     // of the frames, of the points
+constexpr double kFewPoints = 0.02;     // of the points
+constexpr double kContradicted = 0.4;   // of the pixels: poses that fit leave under a tenth inconsistent
 
 /// 0 of nothing.
 template <class Count>
@@ -54,11 +56,29 @@ double share_of(const RunInfo& info, DepthState state) {
 }
 
 std::string baseline_text(const RunInfo& info) {
-  return fmt::format("it moves {:.3g} cm between the frames of a pair (median)", 100 * info.motion.baseline);
+  const double baseline = info.motion.baseline;
+  return baseline < 1
+             ? fmt::format("it moves {:.3g} cm between the frames of a pair (median)", 100 * baseline)
+             : fmt::format("it moves {:.3g} m between the frames of a pair (median)", baseline);
+}
+
+/// Depth beyond the range nearly everywhere: the scene is far, or the poses move far too much.
+Reason why_far(const RunInfo& info) {
+  const std::string name =
+      fmt::format("{} of the pixels are \"far\"", percent(share_of(info, DepthState::far)));
+  const double range = info.range_limit > 0 ? info.range_limit : 20;
+  if (info.motion.baseline > 0.5 * range) {
+    return {name + ": " + baseline_text(info) +
+                ", more than half the range: positions in millimetres or of another flight?",
+            "let `pade info FLIGHT` try the poses on the images"};
+  }
+  return {name + fmt::format(": nothing is nearer than the range of {:g} m", range),
+          "raise --range and --map-range, fly nearer, or let `pade info FLIGHT` try the poses on the images"};
 }
 
 /// Why pixels have no depth, by the state that most of them have.
 Reason why_unmeasured(const RunInfo& info) {
+  if (share_of(info, DepthState::far) > kMost) return why_far(info);
   constexpr std::array kWithoutDepth = {DepthState::epipole, DepthState::low_parallax, DepthState::no_texture,
                                         DepthState::inconsistent, DepthState::out_of_view};
   const DepthState state =
@@ -116,8 +136,8 @@ Reason outside_reason(const RunInfo& info) {
   return {fmt::format("the octree reaches {:.0f} m from the origin with voxels of {:g} m, and the poses lie "
                       "farther away (map coordinates such as UTM?)",
                       32768 * info.map->voxel, info.map->voxel),
-          "subtract a constant from the positions in the pose file so that the flight begins near 0, or take "
-          "larger voxels (--voxel)"};
+          "let the run be made around a point near the flight (--origin flight), or take larger voxels "
+          "(--voxel)"};
 }
 
 Reason beyond_reason(const RunInfo& info) {
@@ -179,9 +199,10 @@ void add_of_map(const RunInfo& info, List& list) {
   }
   const std::uint64_t in_range = depths_in_range(map);
   const std::uint64_t sure = in_range - map.depths_uncertain;
-  if (const double outside = share(map.points_outside, sure); outside > kSomeFrames) {
+  if (const double outside = share(map.points_outside, sure); outside > kFewPoints) {
     list.add("outside-map", HintSeverity::warning,
-             fmt::format("{} of the points lie outside the map", percent(outside)), outside_reason(info));
+             fmt::format("{} of the points lie outside the map and were lost", percent(outside)),
+             outside_reason(info));
   }
   if (const double uncertain = share(map.depths_uncertain, in_range); uncertain > kManyUncertain) {
     list.add("mostly-uncertain", HintSeverity::warning,
@@ -192,11 +213,13 @@ void add_of_map(const RunInfo& info, List& list) {
     list.add("beyond-map", HintSeverity::warning,
              fmt::format("{} of the depths lie beyond the map", percent(beyond)), beyond_reason(info));
   }
-  if (map.free_voxels == 0) {
+  if (map.free_voxels < map.occupied_voxels) {
     list.add("nothing-free", HintSeverity::warning,
-             "the map has obstacles but no free space: nothing tells a planner where it may fly",
-             {"too few pixels around each free voxel have depth",
-              "look at the states on the report; take a denser flow method (--flow)"});
+             fmt::format("the map has obstacles but {}: nothing tells a planner where it may fly",
+                         map.free_voxels == 0 ? "no free space" : "hardly any free space"),
+             {"too few pixels around each free voxel have depth, or the images of different places "
+              "contradict each other",
+              "let `pade info FLIGHT` try the poses on the images; look at the states on the report"});
   }
 }
 
@@ -207,6 +230,15 @@ void add_of_pixels(const RunInfo& info, List& list) {
     list.add("mostly-unmeasured", HintSeverity::warning,
              fmt::format("only {} of the pixels have depth", percent(share_of(info, DepthState::measured))),
              why_unmeasured(info));
+  }
+  if (const double contradicted = share_of(info, DepthState::inconsistent);
+      known >= kFewMeasured && contradicted > kContradicted) {
+    list.add("images-contradict-poses", HintSeverity::warning,
+             fmt::format("{} of the pixels contradict the poses", percent(contradicted)),
+             {"convention, unit, time offset or calibration of the poses are wrong, or most of what is seen "
+              "moves by "
+              "itself",
+              "let `pade info FLIGHT` try the poses on the images; check time_offset_s and camera.yaml"});
   }
   if (info.masked_share > kMost) {
     list.add("large-mask", HintSeverity::warning,

@@ -19,7 +19,8 @@ namespace pade::evaluation {
 ///   mostly-unmeasured hardly a pixel has a depth or a bound, with the reason that most of them have
 ///   mostly-uncertain  most depths are too uncertain to place an obstacle
 ///   beyond-map        most depths lie beyond the range of the map
-///   nothing-free      obstacles, but no free space
+///   nothing-free      obstacles, but less free space than obstacles
+///   images-contradict-poses  most pixels are inconsistent with the poses
 ///   standing-still    the camera hardly moves between the frames of most pairs
 ///   poses-refused     frames without a pose
 ///   poses-too-short   motions too short for what the filter knows of them

@@ -83,8 +83,16 @@ class PairReader {
     const Result<Frame> first = sequence_.frame(newer);
     const Result<Frame> second = sequence_.frame(older);
     if (!first || !second) return;
-    PoseCheckPair pair{
-        grey_of(first->image), grey_of(second->image), first->T_world_camera, second->T_world_camera, {}};
+    PoseCheckPair pair{grey_of(first->image),
+                       grey_of(second->image),
+                       first->T_world_camera,
+                       second->T_world_camera,
+                       {},
+                       {},
+                       {}};
+    if (older > 0) pair.rows_before = {sequence_.pose(newer - 1), sequence_.pose(older - 1)};
+    if (newer + 1 < sequence_.size())
+      pair.rows_after = {sequence_.pose(newer + 1), sequence_.pose(older + 1)};
     if (sequence_.has_truth()) {
       if (Result<cv::Mat> truth = sequence_.truth(newer)) {
         pair.depth = std::move(truth).value();
@@ -130,9 +138,15 @@ void compare_up(const io::Sequence& sequence, SequenceCheck& check) {
     return;
   }
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < sequence.size(); ++i)
+  Eigen::Vector3d look = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < sequence.size(); ++i) {
     mean -= sequence.pose(i).rotation * Eigen::Vector3d::UnitY();
+    look += sequence.pose(i).rotation * Eigen::Vector3d::UnitZ();
+  }
   mean /= static_cast<double>(sequence.size());
+  look /= static_cast<double>(sequence.size());
+  // A camera that looks down has its own up axis level.
+  if (-look.dot(sequence.world_up()->direction) > std::cos(kUpAgrees)) return;
   if (mean.norm() < 0.5) return;
   const double cosine = std::clamp(mean.normalized().dot(sequence.world_up()->direction), -1.0, 1.0);
   check.up_disagreement = std::acos(cosine);

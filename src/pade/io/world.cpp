@@ -23,19 +23,25 @@ std::optional<Eigen::Vector3d> parse_axis(std::string_view text) {
 
 }  // namespace
 
-std::optional<Eigen::Vector3d> parse_direction(std::string_view text) {
-  if (auto axis = parse_axis(text)) return axis;
+std::optional<Eigen::Vector3d> parse_point(std::string_view text) {
   const auto fields = split_fields(text);
   if (fields.size() != 3) return std::nullopt;
-  Eigen::Vector3d direction;
+  Eigen::Vector3d point;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const auto number = parse_number(fields[static_cast<std::size_t>(i)]);
-    if (!number) return std::nullopt;
-    direction[i] = *number;
+    if (!number || !std::isfinite(*number)) return std::nullopt;
+    point[i] = *number;
   }
-  const double norm = direction.stableNorm();
+  return point;
+}
+
+std::optional<Eigen::Vector3d> parse_direction(std::string_view text) {
+  if (auto axis = parse_axis(text)) return axis;
+  const auto direction = parse_point(text);
+  if (!direction) return std::nullopt;
+  const double norm = direction->stableNorm();
   if (!std::isfinite(norm) || norm < 1e-9) return std::nullopt;
-  return direction / norm;
+  return *direction / norm;
 }
 
 std::string to_text(const Eigen::Vector3d& direction) {

@@ -28,6 +28,9 @@ struct WorldUp {
 /// "+x", "-y", "z" ..., or three numbers that are not all zero ("0 0.6 0.8"), as a unit vector. Empty where
 /// the text is neither.
 std::optional<Eigen::Vector3d> parse_direction(std::string_view text);
+/// Three finite numbers ("482913 4649776 120", blanks or commas between them). Empty where the text is no
+/// point.
+std::optional<Eigen::Vector3d> parse_point(std::string_view text);
 /// "+x", "-y" ... for an axis, else three numbers. parse_direction() inverts it.
 std::string to_text(const Eigen::Vector3d& direction);
 

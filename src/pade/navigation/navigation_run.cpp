@@ -63,6 +63,7 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
   });
   run.frames_without_answer += frames.size() - next;
   run.health = navigator.health();
+  run.sensors = navigation::summarise(run.measurements);
   return run;
 }
 

@@ -5,8 +5,10 @@
 #include <optional>
 #include <vector>
 
+#include "pade/core/hint.hpp"
 #include "pade/core/sensors/navigation_log.hpp"
 #include "pade/navigation/navigator.hpp"
+#include "pade/navigation/plausibility/plausibility.hpp"
 
 namespace pade {
 
@@ -38,6 +40,7 @@ struct NavigationRun {
   std::vector<FrameMotion> motions;                   ///< of neighbouring frames with an answer
   std::vector<navigation::Measurement> measurements;  ///< each with its last innovation
   navigation::Health health;
+  std::vector<navigation::SensorSummary> sensors;
   std::size_t frames_without_answer = 0;
 };
 
@@ -54,6 +57,7 @@ struct CameraTrajectory {
   std::size_t frames_left = 0;           ///< with an answer, but not in the longest unbroken chain
   std::optional<GeodeticOrigin> origin;  ///< of the world, where the GNSS log has one
   navigation::Health health;
+  std::vector<Hint> hints;  ///< of log and run, worst first; filled by who knows the log
 };
 
 /// The longest unbroken chain of a run's motions as poses of the camera. The first pose is the filter's own;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "pade/checks/run_hints.hpp"
 #include "pade/core/option_check.hpp"
 #include "pade/core/version.hpp"
@@ -102,6 +104,11 @@ class Run {
     ++used_;
     writer_.add_pose(frame.time, mapper_.T_world_camera());
     path_.push_back(mapper_.T_world_camera().translation);
+    if (options_.world_coordinates) {
+      Pose pose = mapper_.T_world_camera();
+      pose.translation += sequence_.local_origin();
+      world_path_.push_back({frame.time, pose});
+    }
     look_ = mapper_.T_world_camera().matrix3().col(2);
     return update.outcome == MapperUpdate::Outcome::mapped ? take(update, frame.image) : Status();
   }
@@ -170,6 +177,7 @@ class Run {
     info.health.warnings = sequence_.notes();
     info.world_up = sequence_.world_up();
     info.origin = sequence_.origin();
+    info.local_origin = sequence_.local_origin();
     info.map = tally_.map_summary(mapper_.map());
     info.motion = tally_.motion_summary();
     info.masked_share = masked_share(sequence_.mask());
@@ -187,14 +195,24 @@ class Run {
   }
 
   Status write(const MapResult& result) {
-    const std::string frame = "world frame of " + result.info.poses + " (metres)";
+    const Eigen::Vector3d& shift = result.info.local_origin;
+    const std::string world = "world frame of " + result.info.poses + " (metres)";
+    const std::string frame = shift.isZero(0)
+                                  ? world
+                                  : fmt::format("{}\nlocal origin {} {} {}: add it to get back to that frame",
+                                                world, shift.x(), shift.y(), shift.z());
     std::vector<std::pair<std::string, std::string>> files = {
         {"cloud.ply", io::encode_ply(cloud_.cloud(), frame)},
         {"map.bt", io::encode_map(mapper_.map(), io::MapFormat::bt)},
         {"map.ot", io::encode_map(mapper_.map(), io::MapFormat::ot)},
-        {"map.json", io::encode_side_car(options_.mapper.map, result.info.origin)},
+        {"map.json", io::encode_side_car(options_.mapper.map, result.info.origin, shift)},
     };
-    if (options_.pcd) files.emplace_back("cloud.pcd", io::encode_pcd(cloud_.cloud()));
+    if (options_.pcd) files.emplace_back("cloud.pcd", io::encode_pcd(cloud_.cloud(), frame));
+    if (options_.world_coordinates) {
+      files.emplace_back("cloud_world.ply", io::encode_ply(cloud_.cloud(), world, shift));
+      files.emplace_back("trajectory_world.txt", io::format_trajectory(world_path_));
+      if (options_.pcd) files.emplace_back("cloud_world.pcd", io::encode_pcd(cloud_.cloud(), world, shift));
+    }
     if (result.accuracy) {
       files.emplace_back("evaluation.json", evaluation::to_json(*result.accuracy));
       files.emplace_back("evaluation.csv", evaluation::to_csv(*result.accuracy));
@@ -223,6 +241,7 @@ class Run {
   std::map<Time, cv::Mat> truths_;  // of the frames whose depth may still come
   std::vector<io::Skipped> undecodable_;
   std::vector<Eigen::Vector3d> path_;
+  std::vector<io::StampedPose> world_path_;         // where options_.world_coordinates
   Eigen::Vector3d look_ = Eigen::Vector3d::Zero();  // optical axis at the last pose
   std::array<std::vector<double>, stage_names.size()> milliseconds_;
   std::size_t used_ = 0;

@@ -24,6 +24,7 @@ struct MapSequenceOptions {
   navigation::NavigatorOptions navigation;
   mapping::CloudOptions cloud;
   bool pcd = false;
+  bool world_coordinates = false;
   bool report = true;
 
   template <class Self, class Visitor>
@@ -35,6 +36,9 @@ struct MapSequenceOptions {
           "the filter where poses are from-imu-gnss; what the calibration says of its mounting goes first");
     field("cloud", self.cloud, "the point cloud of the run");
     field("pcd", self.pcd, "also writes cloud.pcd");
+    field("world_coordinates", self.world_coordinates,
+          "also writes the clouds and the trajectory with the local origin added: cloud_world.ply, "
+          "trajectory_world.txt");
     field("report", self.report, "writes report.html");
   }
 };

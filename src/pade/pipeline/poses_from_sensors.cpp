@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "pade/io/navigation/navigation_log.hpp"
+#include "pade/pipeline/checked_log.hpp"
 
 namespace pade {
 
@@ -12,8 +12,9 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
                                                          const std::vector<Time>& frames,
                                                          const CameraMounting& mounting,
                                                          const navigation::NavigatorOptions& options) {
-  const auto log = io::read_navigation_log(folder);
-  if (!log) return log.error();
+  const auto checked = read_checked_log(folder);
+  if (!checked) return checked.error();
+  const NavigationLog* const log = &checked->log;
   if (log->gnss.velocities.empty() || log->gnss.fixes.empty()) {
     return Error{fmt::format("{}: no GNSS positions and velocities found, expected them in gnss.csv",
                              folder.string())};
@@ -29,15 +30,15 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
 
   CameraTrajectory trajectory = camera_trajectory(run, mounting.T_body_camera);
   trajectory.origin = log->gnss.origin;
-  if (trajectory.times.empty()) {
-    return Error{fmt::format("{}: the filter never knew its yaw within the {} frames (status: {})",
-                             folder.string(), frames.size(), to_name(run.health.status))};
-  }
+  trajectory.hints = all_hints(*checked, run);
+  if (trajectory.times.empty()) return never_aligned(folder.string(), *checked, run);
   return trajectory;
 }
 
 std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
   std::vector<std::string> notes;
+  for (const Hint& hint : trajectory.hints)
+    notes.push_back(fmt::format("{} -> {}", hint.message, hint.advice));
   const auto motions = trajectory.motions.size();
   const auto false_of = [](const std::vector<bool>& flags) {
     return std::count(flags.begin(), flags.end(), false);

@@ -270,7 +270,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadField{"RosWithoutSize",
                  "camera_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\ndistortion_model: "
                  "plumb_bob\n",
-                 {"field image_width is missing"}},
+                 {"field image_width or width is missing"}},
         BadField{"SkewedMatrix",
                  "camera_matrix: {rows: 3, cols: 3, data: [1, 0.1, 0, 0, 1, 0, 0, 0, 1]}\n",
                  {"3x3 camera matrix"}},

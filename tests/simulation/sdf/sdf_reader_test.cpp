@@ -126,6 +126,36 @@ TEST_F(SdfReader, NamesWhatItLeavesOut) {
   EXPECT_THAT(result->warnings, Contains(HasSubstr("'lamp'")));
 }
 
+TEST_F(SdfReader, RefusesAnUnknownPartOfAMeshByName) {
+  write("t.obj", "o left\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_THAT(
+      message(read_sdf(world(model(
+          "<geometry><mesh><uri>t.obj</uri><submesh><name>middle</name></submesh></mesh></geometry>")))),
+      testing::AllOf(HasSubstr("a.sdf:"), HasSubstr("found no part 'middle'"), HasSubstr("left")));
+}
+
+TEST_F(SdfReader, ChainsSensorPosesThroughNestedModels) {
+  const auto result = read_sdf(world(
+      "<model name='q'><pose>5 5 5 0 0 1</pose><link name='l'/><model name='gimbal'><pose>0.1 0 0 0 0 "
+      "0</pose><link "
+      "name='l'><pose>0 0.2 0 0 0 0</pose><sensor name='c' type='camera'><pose>0 0 0.3 0 0 0</pose><camera>"
+      "<horizontal_fov>1</horizontal_fov><image><width>640</width><height>480</height></image></camera></"
+      "sensor></link>"
+      "</model></model>" +
+      model(kBox)));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_EQ(result->cameras.size(), 1U);
+  EXPECT_LT((result->cameras[0].T_body_camera.translation - Eigen::Vector3d(0.1, 0.2, 0.3)).norm(), 1e-12);
+}
+
+TEST_F(SdfReader, LeavesNothingOnTheErrorStream) {
+  write("models/a/model.sdf",
+        "<sdf version='1.9'><model name='a'><include><uri>model://ghost</uri></include></model></sdf>");
+  testing::internal::CaptureStderr();
+  EXPECT_FALSE(read_sdf(world("<include><uri>model://a</uri></include>")).ok());
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
 TEST_F(SdfReader, RefusesNewerVersions) {
   for (const char* version : {"1.10", "1.11", "2.0", "x"}) {
     EXPECT_THAT(message(read_sdf(world(model(kBox), version))),

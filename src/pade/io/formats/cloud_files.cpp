@@ -21,9 +21,15 @@ constexpr std::string_view kPlyProperties =
     "property float x\nproperty float y\nproperty float z\n"
     "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     "property float sigma\nend_header\n";
-constexpr std::string_view kPcdStart =
-    "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb sigma\nSIZE 4 4 4 4 4\n"
-    "TYPE F F F F F\nCOUNT 1 1 1 1 1\n";
+constexpr std::string_view kPlyPropertiesOfDoubles =
+    "property double x\nproperty double y\nproperty double z\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    "property float sigma\nend_header\n";
+constexpr std::string_view kPcdStart = "# .PCD v0.7 - Point Cloud Data file format\n";
+constexpr std::string_view kPcdFields =
+    "VERSION 0.7\nFIELDS x y z rgb sigma\nSIZE 4 4 4 4 4\nTYPE F F F F F\nCOUNT 1 1 1 1 1\n";
+constexpr std::string_view kPcdFieldsOfDoubles =
+    "VERSION 0.7\nFIELDS x y z rgb sigma\nSIZE 8 8 8 4 4\nTYPE F F F F F\nCOUNT 1 1 1 1 1\n";
 
 template <class Value>
 void put(std::string& bytes, const Value& value) {
@@ -60,15 +66,23 @@ Error refused(std::string_view file, std::string_view what, std::string_view fou
   return {fmt::format("{}: found {}, expected {}", file, found, what)};
 }
 
+void put_position(std::string& bytes, const CloudPoint& point, const std::optional<Eigen::Vector3d>& shift) {
+  if (!shift) return put(bytes, std::array{point.x, point.y, point.z});
+  put(bytes, std::array{static_cast<double>(point.x) + shift->x(), static_cast<double>(point.y) + shift->y(),
+                        static_cast<double>(point.z) + shift->z()});
+}
+
 }  // namespace
 
-std::string encode_ply(const PointCloud& cloud, std::string_view comment) {
+std::string encode_ply(const PointCloud& cloud, std::string_view comment,
+                       const std::optional<Eigen::Vector3d>& shift) {
   std::string bytes(kPlyStart);
   while (!comment.empty()) bytes += fmt::format("comment {}\n", next_line(comment));
-  bytes += fmt::format("element vertex {}\n{}", cloud.size(), kPlyProperties);
+  bytes +=
+      fmt::format("element vertex {}\n{}", cloud.size(), shift ? kPlyPropertiesOfDoubles : kPlyProperties);
   bytes.reserve(bytes.size() + cloud.size() * kPlyPointBytes);
   for (const CloudPoint& point : cloud) {
-    put(bytes, std::array{point.x, point.y, point.z});
+    put_position(bytes, point, shift);
     put(bytes, point.colour);
     put(bytes, point.sigma);
   }
@@ -102,14 +116,17 @@ Result<PointCloud> decode_ply(std::string_view content, std::string_view file) {
   return cloud;
 }
 
-std::string encode_pcd(const PointCloud& cloud) {
+std::string encode_pcd(const PointCloud& cloud, std::string_view comment,
+                       const std::optional<Eigen::Vector3d>& shift) {
   std::string bytes(kPcdStart);
+  while (!comment.empty()) bytes += fmt::format("# {}\n", next_line(comment));
+  bytes += shift ? kPcdFieldsOfDoubles : kPcdFields;
   bytes +=
       fmt::format("WIDTH {0}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA binary\n", cloud.size());
   bytes.reserve(bytes.size() + cloud.size() * kPcdPointBytes);
   for (const CloudPoint& point : cloud) {
     const auto& [red, green, blue] = point.colour;
-    put(bytes, std::array{point.x, point.y, point.z});
+    put_position(bytes, point, shift);
     put(bytes, static_cast<std::uint32_t>(red << 16 | green << 8 | blue));
     put(bytes, point.sigma);
   }
@@ -120,6 +137,10 @@ Result<PointCloud> decode_pcd(std::string_view content, std::string_view file) {
   if (!content.starts_with(kPcdStart))
     return refused(file, "a PCD 0.7 file with x y z rgb sigma", "another beginning");
   std::string_view rest = content.substr(kPcdStart.size());
+  while (rest.starts_with("# ")) next_line(rest);
+  if (!rest.starts_with(kPcdFields))
+    return refused(file, "a PCD 0.7 file with x y z rgb sigma", "other fields");
+  rest.remove_prefix(kPcdFields.size());
   const std::optional<std::size_t> count = count_after(next_line(rest), "WIDTH ");
   if (!count || next_line(rest) != "HEIGHT 1" || !next_line(rest).starts_with("VIEWPOINT ") ||
       count_after(next_line(rest), "POINTS ") != count || next_line(rest) != "DATA binary") {

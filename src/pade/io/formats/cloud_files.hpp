@@ -1,8 +1,11 @@
 // Point clouds as PLY (Stanford) and PCD (Point Cloud Library 0.7) files, both binary, little endian.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include <Eigen/Core>
 
 #include "pade/core/point_cloud.hpp"
 #include "pade/core/result.hpp"
@@ -11,13 +14,17 @@ namespace pade::io {
 
 /// Vertices with x y z (float, metres), red green blue (uchar) and sigma (float, metres), as MeshLab,
 /// CloudCompare and Open3D read them. `comment` lines (split at newlines) say what the frame is.
-std::string encode_ply(const PointCloud& cloud, std::string_view comment = {});
-/// Fields x y z rgb sigma; rgb is packed into a float as PCL does.
-std::string encode_pcd(const PointCloud& cloud);
+/// @param shift  where given, it is added to the points, and x y z are doubles: no digit is lost
+std::string encode_ply(const PointCloud& cloud, std::string_view comment = {},
+                       const std::optional<Eigen::Vector3d>& shift = {});
+/// Fields x y z rgb sigma; rgb is packed into a float as PCL does. Comment lines and shift as above.
+std::string encode_pcd(const PointCloud& cloud, std::string_view comment = {},
+                       const std::optional<Eigen::Vector3d>& shift = {});
 
-/// Reads what encode_ply() wrote; other layouts of PLY are refused. `file` is what messages call the text.
+/// Reads what encode_ply() wrote without a shift; other layouts of PLY are refused. `file` is what messages
+/// call the text.
 Result<PointCloud> decode_ply(std::string_view content, std::string_view file);
-/// Reads what encode_pcd() wrote; other layouts of PCD are refused.
+/// Reads what encode_pcd() wrote without a shift; other layouts of PCD are refused.
 Result<PointCloud> decode_pcd(std::string_view content, std::string_view file);
 
 }  // namespace pade::io

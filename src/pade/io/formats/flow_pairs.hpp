@@ -17,9 +17,15 @@ struct FlowPair {
   std::filesystem::path truth;
 };
 
-/// The pairs in `folder` itself and in its direct subfolders, in order of their names. A folder holds a pair
-/// if it has one truth file (*.flo, or a PNG whose name begins with "flow") and exactly two other PNG, JPEG,
-/// PGM or PPM images; the images' order is that of their names.
+/// The pairs of a folder, in order of their names:
+/// - in itself and in its direct subfolders: one truth file (*.flo, or a PNG whose name begins with "flow")
+/// and
+///   images beside it, two of them or, where the truth is numbered (flow10.flo), those of this number and the
+///   next;
+/// - Middlebury: other-data/SCENE with the truth in other-gt-flow/SCENE;
+/// - KITTI 2012 and 2015: image_2 (else image_0, colored_0) with the truth of flow_occ (else flow_noc);
+/// - MPI Sintel: clean (else final) with the truth of flow.
+/// `folder` may be the root of such a download, its training/, or other-data/.
 /// @return at least one pair, or the error says what was looked for.
 Result<std::vector<FlowPair>> find_flow_pairs(const std::filesystem::path& folder);
 

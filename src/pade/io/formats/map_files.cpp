@@ -205,8 +205,8 @@ std::filesystem::path side_car_of(const std::filesystem::path& map_file) {
   return std::filesystem::path(map_file).replace_extension(".json");
 }
 
-std::string encode_side_car(const mapping::MapOptions& options,
-                            const std::optional<GeographicOrigin>& origin) {
+std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin,
+                            const Eigen::Vector3d& local_origin) {
   nlohmann::ordered_json json;
   json["options"] = nlohmann::ordered_json::parse(to_json(options));
   if (origin) {
@@ -217,6 +217,7 @@ std::string encode_side_car(const mapping::MapOptions& options,
   } else {
     json["geographic_origin"] = nullptr;
   }
+  json["local_origin_m"] = {local_origin.x(), local_origin.y(), local_origin.z()};
   return json.dump(2) + "\n";
 }
 
@@ -235,6 +236,25 @@ Result<std::optional<GeographicOrigin>> decode_side_car(std::string_view content
     *value = (*found)[name].get<double>();
   }
   return std::optional(origin);
+}
+
+Result<Eigen::Vector3d> decode_local_origin(std::string_view content, std::string_view file) {
+  const auto json = nlohmann::json::parse(content, nullptr, false);
+  if (!json.is_object()) return Error{fmt::format("{}: not a JSON object", file)};
+  const auto found = json.find("local_origin_m");
+  if (found == json.end()) return Eigen::Vector3d(Eigen::Vector3d::Zero());
+  const bool good = found->is_array() && found->size() == 3 && (*found)[0].is_number() &&
+                    (*found)[1].is_number() && (*found)[2].is_number();
+  if (!good) return Error{fmt::format("{}: local_origin_m: expected three numbers in metres", file)};
+  return Eigen::Vector3d((*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>());
+}
+
+Eigen::Vector3d local_origin_of(const std::filesystem::path& map_file) {
+  const std::filesystem::path side_car = side_car_of(map_file);
+  const auto text = read_file(side_car);
+  const auto origin =
+      text ? decode_local_origin(*text, side_car.string()) : Result<Eigen::Vector3d>(text.error());
+  return origin ? *origin : Eigen::Vector3d(Eigen::Vector3d::Zero());
 }
 
 }  // namespace pade::io

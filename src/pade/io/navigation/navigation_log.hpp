@@ -1,9 +1,6 @@
 // Logs of navigation sensors, in our own layout and in those of the recordings that we test with. Everything
-// is converted to the project's frames here (body FLU, world ENU), and nowhere else.
-//
-// Our layout (docs/design.md): imu.csv "# frame=FLU" (or FRD), "t_s,gx,gy,gz,ax,ay,az"; gnss.csv
-// "# frame=ENU origin=lat,lon,h" (or NED), "t_s", position (3), velocity (3), six sigmas; baro.csv
-// "t_s,height_m"; mag.csv "t_s,mx,my,mz". A file that does not say its frame is refused.
+// is converted to the project's frames here (body FLU, world ENU), and nowhere else. Columns are found by the exact
+// names of the dialects in docs/formats.md; a file of another layout, or one that does not say its frame, is refused.
 #pragma once
 
 #include <cstddef>

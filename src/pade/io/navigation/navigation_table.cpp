@@ -1,9 +1,11 @@
 #include "pade/io/navigation/navigation_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <fmt/format.h>
@@ -18,105 +20,282 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Takes the text up to the next `separator` off the front of `rest`.
+std::string lower(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return out;
+}
+
+/// Takes the text up to the next `separator` off the front of `rest`. Blanks separate in runs.
 std::string_view take(std::string_view& rest, char separator) {
   const std::size_t end = rest.find(separator);
   const std::string_view head = rest.substr(0, end);
   rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
+  if (separator == ' ') rest = trimmed(rest);
   return head;
 }
 
-double number_or_nan(std::string_view text) {
+/// @param decimal_comma  "0,5" is a half
+double number_or_nan(std::string_view text, bool decimal_comma) {
   text = trimmed(text);
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  std::array<char, 64> with_point{};
+  if (decimal_comma && text.size() < with_point.size() && text.find(',') != std::string_view::npos) {
+    std::replace_copy(text.begin(), text.end(), with_point.begin(), ',', '.');
+    text = {with_point.data(), text.size()};
+  }
   double value = 0;
   const auto [stop, status] = std::from_chars(text.data(), text.data() + text.size(), value);
   const bool whole = status == std::errc{} && stop == text.data() + text.size();
   return whole ? value : std::numeric_limits<double>::quiet_NaN();
 }
 
-/// A heading without its remarks in parentheses, which may hold commas.
+bool is_unit(std::string_view text) {
+  static constexpr std::array<std::string_view, 24> kUnits = {
+      "s",   "ms", "us", "ns", "rad/s", "deg/s",   "dps", "m/s^2",  "m/s2", "m/s/s", "g",  "mg",
+      "m/s", "m",  "cm", "mm", "deg",   "degrees", "rad", "mrad/s", "hz",   "gauss", "ut", "seconds"};
+  return std::find(kUnits.begin(), kUnits.end(), text) != kUnits.end();
+}
+
+std::string without_blanks(std::string_view text) {
+  std::string out;
+  std::copy_if(text.begin(), text.end(), std::back_inserter(out), [](char c) { return c != ' '; });
+  return out;
+}
+
+/// A heading without its remarks in parentheses, which may hold commas; units in parentheses stay, in
+/// brackets.
 std::string without_parentheses(std::string_view text) {
   std::string result;
-  int depth = 0;
-  for (const char c : text) {
-    if (c == '(') ++depth;
-    if (depth == 0) result += c;
-    if (c == ')' && depth > 0) --depth;
+  while (!text.empty()) {
+    const std::size_t open = text.find('(');
+    result += text.substr(0, open);
+    if (open == std::string_view::npos) break;
+    text.remove_prefix(open + 1);
+    int depth = 1;
+    std::size_t end = 0;
+    for (; end < text.size() && depth > 0; ++end) depth += text[end] == '(' ? 1 : text[end] == ')' ? -1 : 0;
+    const std::string inside = lower(trimmed(text.substr(0, depth == 0 ? end - 1 : end)));
+    if (is_unit(inside)) result += "[" + inside + "]";
+    text.remove_prefix(end);
   }
   return result;
 }
 
-std::vector<std::string> split(std::string_view line) {
-  std::vector<std::string> fields;
-  while (true) {
-    const bool last = line.find(',') == std::string_view::npos;
-    fields.emplace_back(trimmed(take(line, ',')));
-    if (last) return fields;
+char separator_of(std::string_view heading) {
+  for (const char c : {',', ';', '\t'}) {
+    if (heading.find(c) != std::string_view::npos) return c;
   }
+  return ' ';
 }
 
-std::size_t count_fields(std::string_view line) {
-  return 1 + static_cast<std::size_t>(std::count(line.begin(), line.end(), ','));
+std::size_t count_fields(std::string_view line, char separator) {
+  std::size_t count = 0;
+  do {
+    const bool last = line.find(separator) == std::string_view::npos;
+    take(line, separator);
+    ++count;
+    if (last) return count;
+  } while (true);
+}
+
+/// "acc_x_mps2" and "acc_x [m/s^2]" are both acc_x in m/s².
+ColumnName column_name(std::string_view field) {
+  ColumnName column;
+  std::string text = lower(trimmed(field));
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  // [0], [1] ... are indices, anything else in brackets is a unit.
+  const std::size_t open = text.find('[');
+  const bool index = open != std::string::npos && open + 1 < text.size() &&
+                     std::isdigit(static_cast<unsigned char>(text[open + 1])) != 0;
+  if (open != std::string::npos && !index) {
+    column.unit = without_blanks(std::string_view(text).substr(open + 1, text.find(']', open) - open - 1));
+    text = text.substr(0, open);
+  }
+  column.name = trimmed(text);
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kSuffixes = {
+      {{"_radps", "rad/s"},
+       {"_rad_s", "rad/s"},
+       {"_rads", "rad/s"},
+       {"_degps", "deg/s"},
+       {"_deg_s", "deg/s"},
+       {"_dps", "deg/s"},
+       {"_mps2", "m/s2"},
+       {"_m_s2", "m/s2"},
+       {"_ms2", "m/s2"},
+       {"_mps", "m/s"},
+       {"_g", "g"},
+       {"_milligauss", "milligauss"},
+       {"_m", "m"},
+       {"_deg", "deg"}}};
+  for (const auto& [suffix, unit] : kSuffixes) {
+    if (!column.unit.empty() || !column.name.ends_with(suffix) || column.name.size() <= suffix.size())
+      continue;
+    column.name.resize(column.name.size() - suffix.size());
+    column.unit = unit;
+  }
+  return column;
+}
+
+std::vector<ColumnName> split_heading(std::string_view line, char separator) {
+  std::vector<ColumnName> columns;
+  line = trimmed(line);
+  while (true) {
+    const bool last = line.find(separator) == std::string_view::npos;
+    columns.push_back(column_name(take(line, separator)));
+    if (last) return columns;
+  }
 }
 
 /// A plain line that names columns: its first field is a word.
 bool is_heading(std::string_view first) {
+  if (!first.empty() && (first.front() == '"' || first.front() == '%')) first.remove_prefix(1);
   return !first.empty() && std::isalpha(static_cast<unsigned char>(first.front())) != 0 && first != "nan";
 }
 
-}  // namespace
+constexpr std::array<std::string_view, 16> kTimeNames = {
+    "t_s",     "t",       "time",   "time_s",       "times",   "timestamp",    "timestamp_s", "stamp",
+    "time_ns", "time_us", "timeus", "timestamp_ns", "time_ms", "timestamp_us", "time_usec",   "%time"};
 
-std::optional<std::size_t> NumericTable::column(std::string_view prefix) const {
+std::size_t find_stamp_column(const std::vector<ColumnName>& columns) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (columns[i].starts_with(prefix)) return i;
+    if (std::find(kTimeNames.begin(), kTimeNames.end(), columns[i].name) != kTimeNames.end()) return i;
+  }
+  return 0;
+}
+
+/// What the heading says about its stamps.
+std::optional<TimeUnit> stated_unit(const ColumnName& column) {
+  static constexpr std::array<std::pair<std::string_view, TimeUnit>, 18> kNames = {
+      {{"t_s", TimeUnit::seconds},
+       {"time_s", TimeUnit::seconds},
+       {"times", TimeUnit::seconds},
+       {"timestamp_s", TimeUnit::seconds},
+       {"[s]", TimeUnit::seconds},
+       {"[sec]", TimeUnit::seconds},
+       {"[seconds]", TimeUnit::seconds},
+       {"time_ms", TimeUnit::milliseconds},
+       {"[ms]", TimeUnit::milliseconds},
+       {"time_us", TimeUnit::microseconds},
+       {"timeus", TimeUnit::microseconds},
+       {"time_usec", TimeUnit::microseconds},
+       {"timestamp_us", TimeUnit::microseconds},
+       {"[us]", TimeUnit::microseconds},
+       {"time_ns", TimeUnit::nanoseconds},
+       {"timestamp_ns", TimeUnit::nanoseconds},
+       {"%time", TimeUnit::nanoseconds},
+       {"[ns]", TimeUnit::nanoseconds}}};
+  for (const auto& [name, unit] : kNames) {
+    if (column.name == name || "[" + column.unit + "]" == name) return unit;
   }
   return std::nullopt;
 }
 
-Result<std::size_t> NumericTable::group(std::string_view prefix, std::size_t count) const {
-  const auto first = column(prefix);
-  if (!first) return Error{fmt::format("{}: no column '{}' in the heading", name, prefix)};
-  if (*first + count > width()) {
-    return Error{
-        fmt::format("{}: {} columns expected from '{}' on, found {}", name, count, prefix, width() - *first)};
+}  // namespace
+
+std::optional<std::size_t> NumericTable::column(std::string_view wanted) const {
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i].name == wanted) return i;
   }
-  return *first;
+  return std::nullopt;
+}
+
+std::optional<std::size_t> NumericTable::column(std::initializer_list<std::string_view> wanted) const {
+  for (const std::string_view one : wanted) {
+    if (const auto found = column(one)) return found;
+  }
+  return std::nullopt;
+}
+
+std::string NumericTable::column_names() const {
+  std::string text;
+  for (const ColumnName& column : columns) {
+    text += (text.empty() ? "" : ", ") + column.name;
+    if (text.size() > 160) return text.substr(0, 160) + " ...";
+  }
+  return text;
+}
+
+Result<std::vector<std::optional<Time>>> times_of(const NumericTable& table, const StampRule& rule,
+                                                  std::vector<std::string>& remarks) {
+  std::vector<std::optional<Time>> times;
+  times.reserve(table.rows());
+  if (rule.column) {
+    const double scale = static_cast<double>(nanoseconds_per(rule.unit.value_or(TimeUnit::seconds)));
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      const double value = table.at(row, *rule.column) * scale;
+      times.push_back(std::abs(value) < 4.6e18 ? std::optional(Time{std::llround(value)}) : std::nullopt);
+    }
+    return times;
+  }
+  const ColumnName& column = table.columns[table.stamp_column];
+  const auto stated = stated_unit(column);
+  const auto guessed = guess_unit(table.stamps, rule.slowest);
+  const TimeUnit unit = stated.value_or(rule.unit.value_or(guessed.value_or(TimeUnit::seconds)));
+  const double step = median_step(table.stamps) * static_cast<double>(nanoseconds_per(unit)) * 1e-9;
+  if (step > rule.slowest) {
+    const std::string better =
+        guessed && *guessed != unit ? fmt::format("; they fit {}", name_of(*guessed)) : std::string();
+    return Error{fmt::format(
+        "{}: samples are {:.3g} s apart (median of {}), expected at most {:g} s: stamps are not in "
+        "{}?{}",
+        table.name, step, column.name, rule.slowest, name_of(unit), better)};
+  }
+  if (!stated && !rule.unit && unit != TimeUnit::seconds) {
+    remarks.push_back(fmt::format("{}: the heading gives no unit of time; {} is taken as {}, from its steps",
+                                  table.name, column.name, name_of(unit)));
+  }
+  for (const std::string_view stamp : table.stamps) times.push_back(parse_stamp(stamp, unit));
+  return times;
 }
 
 Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
   NumericTable table;
   table.name = name;
+  char separator = ',';
   std::size_t line_number = 0;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   while (!text.empty()) {
-    const std::string_view line = trimmed(take(text, '\n'));
+    const std::string_view whole_line = take(text, '\n');
+    const std::string_view line = trimmed(whole_line);
     ++line_number;
     if (line.empty()) continue;
     if (line.front() == '#') {
       const std::string_view content = trimmed(line.substr(1));
       table.comment.append(content).push_back(' ');
       const std::string heading = without_parentheses(content);
-      if (table.rows() == 0 && count_fields(heading) >= 2 && heading.find('=') == std::string::npos) {
-        table.columns = split(heading);
+      const char candidate = separator_of(heading);
+      if (candidate != ' ' && table.rows() == 0 && count_fields(heading, candidate) >= 2 &&
+          heading.find('=') == std::string::npos) {
+        separator = candidate;
+        table.columns = split_heading(heading, separator);
       }
       continue;
     }
-    const std::string_view first = trimmed(line.substr(0, line.find(',')));
-    if (table.rows() == 0 && table.bad_lines == 0 && is_heading(first)) {
-      table.columns = split(without_parentheses(line));
+    if (table.rows() == 0 && table.bad_lines == 0 &&
+        is_heading(line.substr(0, line.find_first_of(",; \t")))) {
+      const std::string heading = without_parentheses(line);
+      separator = separator_of(heading);
+      table.columns = split_heading(heading, separator);
       continue;
     }
     if (table.columns.empty()) {
       return Error{fmt::format("{}:{}: found '{}', expected a heading with the names of the columns", name,
                                line_number, line.substr(0, 40))};
     }
-    if (count_fields(line) != table.width()) {
+    if (table.rows() == 0) table.stamp_column = find_stamp_column(table.columns);
+    // An empty field at the end of a line of tabs is a field.
+    std::string_view rest = separator == '\t' ? whole_line.substr(0, whole_line.find('\r')) : line;
+    if (count_fields(rest, separator) != table.width()) {
       if (table.bad_lines++ == 0) table.first_bad_line = line_number;
       continue;
     }
-    std::string_view rest = line;
-    for (std::size_t i = 0; i < table.width(); ++i) table.values.push_back(number_or_nan(take(rest, ',')));
-    table.stamps.push_back(first);
+    for (std::size_t i = 0; i < table.width(); ++i) {
+      const std::string_view field = trimmed(take(rest, separator));
+      table.values.push_back(number_or_nan(field, separator == ';' || separator == '\t'));
+      if (i == table.stamp_column) table.stamps.push_back(field);
+    }
     table.line_numbers.push_back(line_number);
   }
   if (table.columns.empty())

@@ -238,6 +238,11 @@ void read_optional_parts(Fields& fields, RunInfo& info) {
     origin.read("longitude_deg", info.origin->longitude_deg, "degrees");
     origin.read("height_m", info.origin->height, "metres");
   }
+  if (fields.has("local_origin_m")) {  // absent in runs of earlier versions
+    std::vector<double> origin;
+    fields.read("local_origin_m", origin, "three numbers");
+    if (origin.size() == 3) info.local_origin = Eigen::Vector3d(origin[0], origin[1], origin[2]);
+  }
   if (fields.has("map")) {
     info.map.emplace();
     read_map(fields.object("map"), *info.map);
@@ -296,6 +301,7 @@ std::string to_json(const RunInfo& info) {
                {"health", json_of(info.health)},
                {"world_up", nullptr},
                {"geographic_origin", nullptr},
+               {"local_origin_m", {info.local_origin.x(), info.local_origin.y(), info.local_origin.z()}},
                {"map", nullptr},
                {"motion", json_of(info.motion)},
                {"masked_share", info.masked_share},

@@ -29,7 +29,7 @@ enum class PoseConvention {
 
 /// The content of a calibration file. Empty = the file does not say.
 struct Calibration {
-  std::string format;            ///< "camera.yaml", "Kalibr", "ROS camera_info", "OpenCV" or "EuRoC"
+  std::string format;  ///< "camera.yaml", "Kalibr", "ROS camera_info", "OpenCV", "EuRoC", "ORB-SLAM" ...
   std::optional<Camera> camera;  ///< width = height = 0 where the file states no image size
   std::optional<Pose> T_body_camera;
   std::optional<double> time_offset_s;  ///< t_imu = t_image + offset
@@ -42,12 +42,18 @@ struct Calibration {
   std::vector<std::string> unknown_fields;  ///< present in the file, meaningless to us
 };
 
-/// Reads a calibration and recognises its format: our camera.yaml, a Kalibr camchain (its first camera), ROS
-/// camera_info, OpenCV FileStorage YAML, or EuRoC sensor.yaml. Every field that is used is checked; the error
-/// names file, line, field, what was found and what was expected.
-Result<Calibration> read_calibration(const std::filesystem::path& file);
+/// What our camera.yaml calls a lens model.
+std::string_view lens_name(Distortion model);
+
+/// Reads a calibration and recognises its dialect by what it says (docs/formats.md): our camera.yaml, a
+/// Kalibr camchain, ROS camera_info, OpenCV FileStorage YAML, EuRoC sensor.yaml, the settings of ORB-SLAM and
+/// VINS, KITTI's calib.txt and calib_cam_to_cam.txt, COLMAP's cameras.txt. Every field that is used is
+/// checked; the error names file, line, field, what was found and what was expected. Fields that look like a
+/// lens, a camera model or a mounting and are not understood are refused, never left out. `camera` chooses
+/// where a file holds several, from 0.
+Result<Calibration> read_calibration(const std::filesystem::path& file, int camera = 0);
 /// The same from text; `file` is the name in messages.
-Result<Calibration> parse_calibration(std::string_view text, const std::string& file);
+Result<Calibration> parse_calibration(std::string_view text, const std::string& file, int camera = 0);
 
 }  // namespace io
 

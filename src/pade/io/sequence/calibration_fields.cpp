@@ -1,7 +1,10 @@
 #include "pade/io/sequence/calibration_fields.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/LU>
 #include <fmt/format.h>
@@ -16,6 +19,33 @@ std::optional<double> finite_number(const Yaml& node) {
   const auto value = parse_number(node.scalar);
   if (!value || !std::isfinite(*value)) return std::nullopt;
   return value;
+}
+
+/// A name as people vary it: lower case, letters and digits only.
+std::string plain(std::string_view name) {
+  std::string out;
+  for (const char c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  return out;
+}
+
+bool looks_like_lens(std::string_view key) {
+  static constexpr std::array<std::string_view, 10> kParts = {
+      "distort", "lens",   "fisheye", "cameramodel", "modeltype",
+      "intrin",  "extrin", "focal",   "principal",   "projection"};
+  static constexpr std::array<std::string_view, 23> kWhole = {
+      "k",  "d",  "fx", "fy", "cx", "cy",    "k1",  "k2", "k3", "k4",     "k5",     "k6",
+      "p1", "p2", "xi", "fu", "fv", "alpha", "mtx", "pu", "pv", "camera", "cameras"};
+  const std::string name = plain(key);
+  if (std::find(kWhole.begin(), kWhole.end(), name) != kWhole.end()) return true;
+  if (key.starts_with("T_") || key.starts_with("R_") || key.starts_with("q_") || name.starts_with("dist")) {
+    return true;
+  }
+  return std::any_of(kParts.begin(), kParts.end(),
+                     [&](std::string_view part) { return name.find(part) != std::string::npos; });
 }
 
 std::string joined(std::initializer_list<std::string_view> names) {
@@ -148,54 +178,99 @@ std::vector<std::string> CalibrationFields::unused() const {
   return names;
 }
 
+void CalibrationFields::refuse_lens_like() {
+  for (const auto& [name, value] : map_.map) {
+    if (used_.contains(name) || !looks_like_lens(name)) continue;
+    return fail(
+        fmt::format("line {}: field {}: looks like a lens, a camera model or a mounting, and is not "
+                    "understood in this place: it would be ignored; rename it, remove it, or write a "
+                    "camera.yaml (docs/formats.md)",
+                    value.line, name));
+  }
+}
+
+std::string CalibrationFields::spelled(std::initializer_list<std::string_view> names) const {
+  for (const std::string_view wanted : names) {
+    for (const auto& [name, value] : map_.map) {
+      if (value.kind != Yaml::Kind::null && plain(name) == plain(wanted)) return name;
+    }
+  }
+  return std::string(*names.begin());
+}
+
+namespace {
+
+struct LensName {
+  std::string_view name;  ///< plain()
+  Distortion model;
+};
+
+std::optional<Distortion> lens_named(std::string_view name) {
+  static constexpr LensName kNames[] = {
+      {"none", Distortion::none},
+      {"pinhole", Distortion::none},
+      {"plumbbob", Distortion::plumb_bob},
+      {"radtan", Distortion::plumb_bob},
+      {"radialtangential", Distortion::plumb_bob},
+      {"brownconrady", Distortion::plumb_bob},
+      {"opencv", Distortion::plumb_bob},
+      {"rationalpolynomial", Distortion::rational_polynomial},
+      {"equidistant", Distortion::equidistant},
+      {"equi", Distortion::equidistant},
+      {"fisheye", Distortion::equidistant},
+      {"opencvfisheye", Distortion::equidistant},
+      {"kannalabrandt", Distortion::equidistant},
+      {"kannalabrandt4", Distortion::equidistant},
+      {"kannalabrandt8", Distortion::equidistant},
+      {"kb4", Distortion::equidistant},
+  };
+  const std::string wanted = plain(name);
+  for (const auto& [known, model] : kNames) {
+    if (known == wanted) return model;
+  }
+  return std::nullopt;
+}
+
+/// How many coefficients a model has: least and most.
+std::pair<std::size_t, std::size_t> coefficients_of(Distortion model) {
+  switch (model) {
+    case Distortion::none:
+      return {0, 0};
+    case Distortion::plumb_bob:
+      return {4, 5};
+    case Distortion::rational_polynomial:
+      return {8, 8};
+    case Distortion::equidistant:
+      return {4, 4};
+  }
+  return {0, 0};
+}
+
+}  // namespace
+
 std::optional<std::string> set_distortion(Camera& camera, std::string_view model,
                                           const std::vector<double>& coefficients) {
-  struct Dialect {
-    std::string_view name;
-    Distortion model;
-  };
-  static constexpr Dialect kDialects[] = {
-      {"none", Distortion::none},
-      {"plumb_bob", Distortion::plumb_bob},
-      {"radtan", Distortion::plumb_bob},
-      {"radial-tangential", Distortion::plumb_bob},
-      {"rational_polynomial", Distortion::rational_polynomial},
-      {"equidistant", Distortion::equidistant},
-      {"fisheye", Distortion::equidistant},
-      {"kannala_brandt", Distortion::equidistant},
-  };
-  const auto* const known = std::find_if(std::begin(kDialects), std::end(kDialects),
-                                         [&](const Dialect& dialect) { return dialect.name == model; });
-  if (known == std::end(kDialects)) {
+  const auto known = lens_named(model);
+  if (!known) {
     return fmt::format(
         "found distortion model {}, expected none, plumb_bob, rational_polynomial or equidistant",
         in_quotes(model));
   }
-  const std::size_t count = coefficients.size();
-  const auto expected = [&](std::string_view numbers) {
-    return fmt::format("found {} distortion coefficients, expected {} for {}", count, numbers, model);
-  };
-  switch (known->model) {
-    case Distortion::none:
-      if (std::any_of(coefficients.begin(), coefficients.end(), [](double k) { return k != 0; })) {
-        return "found distortion coefficients other than 0 with the distortion model none";
-      }
-      camera.distortion = Distortion::none;
-      camera.coefficients = {};
-      return std::nullopt;
-    case Distortion::plumb_bob:
-      if (count != 4 && count != 5) return expected("4 or 5");
-      break;
-    case Distortion::rational_polynomial:
-      if (count != 8) return expected("8");
-      break;
-    case Distortion::equidistant:
-      if (count != 4) return expected("4");
-      break;
+  const auto [least, most] = coefficients_of(*known);
+  std::size_t count = coefficients.size();
+  while (count > most && coefficients[count - 1] == 0) --count;
+  if (*known == Distortion::none && count > 0) {
+    return "found distortion coefficients other than 0 with the distortion model none";
   }
-  camera.distortion = known->model;
+  if (count < least || count > most) {
+    const std::string expected =
+        least == most ? fmt::format("{}", most) : fmt::format("{} or {}", least, most);
+    return fmt::format("found {} distortion coefficients, expected {} for {}{}", count, expected, model,
+                       count > 8 ? " (thin prism and tilt are not supported)" : "");
+  }
+  camera.distortion = *known;
   camera.coefficients = {};
-  std::copy(coefficients.begin(), coefficients.end(), camera.coefficients.begin());
+  std::copy_n(coefficients.begin(), count, camera.coefficients.begin());
   return std::nullopt;
 }
 

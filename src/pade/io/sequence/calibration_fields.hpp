@@ -39,6 +39,10 @@ class CalibrationFields {
   /// A rigid transform of 16 numbers (4x4 by rows), checked to be one.
   std::optional<Pose> transform(std::string_view name);
 
+  /// The key of the file that equals one of `names` but for case, blanks and underscores ("distCoeffs" for
+  /// "dist_coeffs"); the first of `names` where there is none.
+  [[nodiscard]] std::string spelled(std::initializer_list<std::string_view> names) const;
+
   /// Complains where none of the names is present.
   void require(std::initializer_list<std::string_view> names, std::string_view expected);
   /// Complains about a field.
@@ -51,6 +55,9 @@ class CalibrationFields {
   }
   /// Fields that nobody asked for.
   [[nodiscard]] std::vector<std::string> unused() const;
+  /// Complains about a field that nobody asked for and that looks like a lens, a camera model or a mounting:
+  /// to go on without it would be to use another camera than the file describes.
+  void refuse_lens_like();
 
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
@@ -64,8 +71,9 @@ class CalibrationFields {
 };
 
 /// Sets the lens of `camera` from the name and the coefficients of a distortion model in any of the dialects:
-/// none, plumb_bob = radtan = radial-tangential (4 or 5 numbers), rational_polynomial (8), equidistant =
-/// fisheye = kannala_brandt (4). Returns what is wrong, or nothing.
+/// none, plumb_bob = radtan = radial-tangential = brown_conrady (4 or 5 numbers, none = no distortion),
+/// rational_polynomial (8), equidistant = fisheye = kannala_brandt (4), whatever the case. Zeros behind them
+/// (thin prism, tilt) are left out. Returns what is wrong, or nothing.
 std::optional<std::string> set_distortion(Camera& camera, std::string_view model,
                                           const std::vector<double>& coefficients);
 

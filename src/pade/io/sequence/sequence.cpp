@@ -14,6 +14,7 @@
 #include "pade/io/sequence/frame_mask.hpp"
 #include "pade/io/sequence/image_file.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
+#include "pade/io/sequence/pose_world.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
@@ -168,13 +169,10 @@ IntensityScaling choose_intensity(int bits, const std::vector<FrameEntry>& frame
   return intensity_from_percentiles(samples);
 }
 
-std::optional<WorldUp> mean_camera_up(const std::vector<FrameEntry>& frames) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const FrameEntry& frame : frames) sum -= frame.T_world_camera.matrix3().col(1);  // camera y is down
-  if (sum.norm() < 0.1 * static_cast<double>(frames.size())) return std::nullopt;
-  Eigen::Index axis = 0;
-  sum.cwiseAbs().maxCoeff(&axis);
-  return WorldUp{std::copysign(1.0, sum[axis]) * Eigen::Vector3d::Unit(axis), false, "mean camera-down axis"};
+std::vector<Pose> poses_of(const std::vector<FrameEntry>& frames) {
+  std::vector<Pose> poses;
+  for (const FrameEntry& frame : frames) poses.push_back(frame.T_world_camera);
+  return poses;
 }
 
 /// `# frame=ENU origin=lat,lon,h` in the head of gnss.csv.
@@ -234,6 +232,12 @@ Status check(const SequenceOptions& options) {
     return Error{fmt::format("option world_up is {}, expected +x, -x, +y, -y, +z, -z or three numbers",
                              in_quotes(options.world_up))};
   }
+  const bool named = options.origin == "auto" || options.origin == "flight" || options.origin == "none";
+  if (!named && !parse_point(options.origin)) {
+    return Error{fmt::format("option origin is {}, expected auto, flight, none or three numbers in metres",
+                             in_quotes(options.origin))};
+  }
+  if (options.camera < 0) return Error{"option camera: expected a number >= 0"};
   const OptionRange ranges[] = {
       {"largest_pose_gap", options.largest_pose_gap},
       {"largest_truth_gap", options.largest_truth_gap},
@@ -255,11 +259,13 @@ struct Sequence::Data {
   cv::Mat mask;
   std::optional<WorldUp> up;
   std::optional<GeographicOrigin> origin;
+  Eigen::Vector3d local_origin = Eigen::Vector3d::Zero();
 
   Status choose_frames(const PoseSource& source);
   Status make_mask();
   void choose_truth();
   void choose_world();
+  void choose_origin();
 };
 
 /// Camera and frames.
@@ -339,10 +345,29 @@ void Sequence::Data::choose_world() {
     up = WorldUp{*listing.calibration.world_up, true, "camera.yaml"};
   } else if (listing.world_up) {
     up = listing.world_up;
-  } else {
-    up = mean_camera_up(frames);
   }
   origin = listing.calibration.origin ? listing.calibration.origin : gnss_origin(folder);
+  if (up) return;
+  const std::vector<Pose> cameras = poses_of(frames);
+  up = guess_up(cameras);
+  if (!up && origin && may_point_up(Eigen::Vector3d::UnitZ(), cameras)) {
+    up = WorldUp{Eigen::Vector3d::UnitZ(), false, "east-north-up of the geographic origin"};
+  }
+  if (up) return;
+  report.notes.push_back(
+      fmt::format("which axis points up is unknown ({}); say it with --world-up or world_up in "
+                  "camera.yaml",
+                  why_no_up(cameras)));
+}
+
+void Sequence::Data::choose_origin() {
+  local_origin = chosen_origin(options.origin, poses_of(frames));
+  if (local_origin.isZero(0)) return;
+  for (FrameEntry& frame : frames) frame.T_world_camera.translation -= local_origin;
+  report.notes.push_back(
+      fmt::format("the positions lie far from 0 0 0: the run is made around the local origin {} {} {}, which "
+                  "is in run.json",
+                  local_origin.x(), local_origin.y(), local_origin.z()));
 }
 
 Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& options,
@@ -351,7 +376,8 @@ Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& o
   auto data = std::make_unique<Data>();
   data->folder = folder;
   data->options = options;
-  auto listing = read_layout(folder, {options.poses, options.calibration, source != nullptr}, data->report);
+  auto listing = read_layout(folder, {options.poses, options.calibration, source != nullptr, options.camera},
+                             data->report);
   if (!listing) return listing.error();
   if (source) listing->pose_file = options.poses;
   data->listing = std::move(*listing);
@@ -359,6 +385,7 @@ Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& o
   if (auto good = data->make_mask(); !good) return good.error();
   data->choose_truth();
   data->choose_world();
+  data->choose_origin();
   make_relative(data->report, folder);
   Sequence sequence(std::move(data));
   if (auto good = sequence.check(0); !good) return good.error();
@@ -440,6 +467,7 @@ const SequenceOptions& Sequence::options() const { return data_->options; }
 const IntensityScaling& Sequence::intensity() const { return data_->intensity; }
 const std::optional<WorldUp>& Sequence::world_up() const { return data_->up; }
 const std::optional<GeographicOrigin>& Sequence::origin() const { return data_->origin; }
+const Eigen::Vector3d& Sequence::local_origin() const { return data_->local_origin; }
 const Calibration& Sequence::calibration() const { return data_->listing.calibration; }
 const Trajectory& Sequence::trajectory() const { return data_->listing.trajectory; }
 std::size_t Sequence::listed_frames() const { return data_->listing.images.size(); }

@@ -28,6 +28,8 @@ struct SequenceOptions {
   std::string poses = "groundtruth";
   std::string calibration;
   std::string world_up;
+  std::string origin = "auto";
+  int camera = 0;
   double largest_pose_gap = 0.5;
   double largest_truth_gap = 0.02;
   int mask_growth = 8;
@@ -40,6 +42,11 @@ struct SequenceOptions {
     field("calibration", self.calibration, "calibration file to use instead of the sequence's own");
     field("world_up", self.world_up,
           "direction of the pose world that points up: +x, -x, +y, -y, +z, -z or \"x y z\"");
+    field(
+        "origin", self.origin,
+        "point of the pose world that becomes 0 0 0 of the run: auto (a point near the flight where that is "
+        "farther than 1 km from 0 0 0), flight (always a point near the flight), none, or \"x y z\"");
+    field("camera", self.camera, "which camera of a calibration file that holds several, from 0");
     field("largest_pose_gap", self.largest_pose_gap,
           "poses are interpolated between rows at most this far apart, s");
     field("largest_truth_gap", self.largest_truth_gap,
@@ -84,7 +91,8 @@ class Sequence {
   [[nodiscard]] std::size_t size() const;
   [[nodiscard]] Time time(std::size_t i) const;
   [[nodiscard]] const std::filesystem::path& image_file(std::size_t i) const;
-  /// Pose of the camera of frame i: interpolated at image time + time_offset_s, T_body_camera applied.
+  /// Pose of the camera of frame i: interpolated at image time + time_offset_s, T_body_camera applied,
+  /// local_origin() subtracted.
   [[nodiscard]] const Pose& pose(std::size_t i) const;
 
   /// Frame i: 8 bit grey or BGR, undistorted. Error where the pixels cannot be decoded; the caller skips it,
@@ -117,6 +125,11 @@ class Sequence {
   /// common direction.
   [[nodiscard]] const std::optional<WorldUp>& world_up() const;
   [[nodiscard]] const std::optional<GeographicOrigin>& origin() const;
+  /// The point of the pose world that is 0 0 0 of pose() and of everything made from it, metres: whole
+  /// numbers chosen by SequenceOptions::origin, zero where nothing is shifted. What is made in single
+  /// precision (clouds, the octree) would lose centimetres to decimetres in map coordinates such as UTM, or
+  /// all.
+  [[nodiscard]] const Eigen::Vector3d& local_origin() const;
   /// T_body_camera, time offset, GNSS lever arm and the like, as far as stated.
   [[nodiscard]] const Calibration& calibration() const;
   /// The pose file as read (of the body where calibration says so).

@@ -110,6 +110,13 @@ std::optional<fs::path> resolve_uri(const std::string& uri, const fs::path& base
   for (const fs::path& folder : resources) {
     if (io::path_exists(folder / name)) return folder / name;
   }
+  // model://NAME/... of the model that the file itself lies in, wherever that is.
+  for (fs::path above = base; above.has_relative_path(); above = above.parent_path()) {
+    if (uri.starts_with("model://") && io::path_exists(above.parent_path() / name) &&
+        fs::path(name).begin()->string() == above.filename().string()) {
+      return above.parent_path() / name;
+    }
+  }
   return std::nullopt;
 }
 

@@ -1,15 +1,24 @@
 #include "pade/simulation/sdf/sdf_reader.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
+#include <iostream>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include <fmt/format.h>
 #include <sdf/sdf.hh>
 
+#include "pade/io/text.hpp"
+#include "pade/simulation/sdf/sdf_repair.hpp"
+#include "pade/simulation/sdf/sdf_sensors.hpp"
 #include "pade/simulation/sdf/sdf_warnings.hpp"
+#include "pade/simulation/world/extrusion.hpp"
 #include "pade/simulation/world/mesh_file.hpp"
+#include "pade/simulation/world/named_colours.hpp"
 
 namespace pade::simulation {
 namespace {
@@ -37,8 +46,13 @@ Error error_of(const sdf::Error& error, const fs::path& file) {
 /// Keeps what libsdformat prints, since some of its errors are only printed.
 class ConsoleCapture {
  public:
-  ConsoleCapture() : previous_(stream().GetStream()) { stream().SetStream(&text_); }
-  ~ConsoleCapture() { stream().SetStream(previous_); }
+  ConsoleCapture() : previous_(stream().GetStream()), previous_errors_(std::cerr.rdbuf(text_.rdbuf())) {
+    stream().SetStream(&text_);
+  }
+  ~ConsoleCapture() {
+    stream().SetStream(previous_);
+    std::cerr.rdbuf(previous_errors_);
+  }
   ConsoleCapture(const ConsoleCapture&) = delete;
   ConsoleCapture& operator=(const ConsoleCapture&) = delete;
   [[nodiscard]] std::string text() const { return text_.str(); }
@@ -47,6 +61,20 @@ class ConsoleCapture {
   static sdf::Console::ConsoleStream& stream() { return sdf::Console::Instance()->GetMsgStream(); }
   std::ostringstream text_;
   std::ostream* previous_;
+  std::streambuf* previous_errors_;  // included models report there
+};
+
+/// libsdformat asks the global callback, not that of the configuration, for the includes of included models.
+class FindCallback {
+ public:
+  explicit FindCallback(std::function<std::string(const std::string&)> find) {
+    sdf::setFindCallback(std::move(find));
+  }
+  ~FindCallback() {
+    sdf::setFindCallback([](const std::string&) { return std::string(); });
+  }
+  FindCallback(const FindCallback&) = delete;
+  FindCallback& operator=(const FindCallback&) = delete;
 };
 
 class Reader {
@@ -56,13 +84,21 @@ class Reader {
   Result<World> read();
 
  private:
-  Status add_model(const sdf::Model& model, const Pose& T_world_parent, const std::string& prefix);
-  Status add_link(const sdf::Link& link, const Pose& T_world_model, const std::string& prefix);
+  Result<sdf::SDFPtr> parse();
+  Status add_world(const sdf::World& world);
+  /// @param T_top_parent  of the parent in the outermost model, whose frame is the body of its sensors
+  Status add_model(const sdf::Model& model, const Pose& T_world_parent, const Pose& T_top_parent,
+                   const std::string& prefix);
+  Status add_inserted(const sdf::ElementPtr& element);
+  Status add_link(const sdf::Link& link, const Pose& T_world_link, const std::string& prefix);
+  Status add_polylines(const sdf::ElementPtr& geometry, const Visual& visual);
+  /// Where <state> puts it, else where the model does.
+  [[nodiscard]] Pose placed(const std::string& name, const Pose& otherwise) const;
   Status add_visual(const sdf::Visual& source, const Pose& T_world_link, const std::string& prefix);
   Status add_mesh(const sdf::Mesh& mesh, Visual visual, bool has_material);
-  Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_link, const std::string& prefix);
   void add_light(const sdf::Light& light);
-  Result<Material> material_of(const sdf::Material& source) const;
+  Result<Material> material_of(const sdf::Material& source);
+  void choose_colour(const sdf::Material& source, Material& material);
   Status read_pattern(const sdf::ElementPtr& element, Material& material) const;
   [[nodiscard]] fs::path folder_of(const std::string& named_file) const {
     return named_file.empty() || named_file.front() == '<' ? file_.parent_path()
@@ -72,7 +108,9 @@ class Reader {
   fs::path file_;
   ResourcePaths resources_;
   World world_;
-  std::map<std::string, std::vector<MeshPart>> meshes_;
+  WorldState state_;
+  std::set<std::string> script_told_;
+  std::map<std::pair<std::string, SubMesh>, std::vector<MeshPart>> meshes_;
 };
 
 Pose resolved(const sdf::SemanticPose& semantic, const ignition::math::Pose3d& raw) {
@@ -81,53 +119,103 @@ Pose resolved(const sdf::SemanticPose& semantic, const ignition::math::Pose3d& r
   return pose_of(pose);
 }
 
-Result<World> Reader::read() {
-  if (const Status status = check_sdf_files(file_, resources_); !status) return status.error();
+/// Reads the document, mends what libsdformat would refuse although it cannot be seen.
+Result<sdf::SDFPtr> Reader::parse() {
   sdf::ParserConfig config;
-  config.SetFindCallback([this](const std::string& uri) {
+  const auto find = [this](const std::string& uri) {
     const auto found = resolve_uri(uri, file_.parent_path(), resources_);
-    return found ? found->string() : std::string();
-  });
-  for (const fs::path& folder : resources_) config.AddURIPath("model://", folder.string());
-  sdf::Root root;
-  std::string printed;
-  {
-    const ConsoleCapture console;
-    const sdf::Errors errors = root.Load(file_.string(), config);
-    printed = console.text();
-    if (!errors.empty()) {
-      // The returned error has the line, the printed one what was found there.
-      Error error = error_of(errors.front(), file_);
-      if (const auto detail = printed_error(printed)) error.message += fmt::format(" ({})", *detail);
-      return error;
-    }
+    if (!found) return std::string();
+    // libsdformat takes a folder only with a model.config, but any file.
+    const bool described =
+        io::path_exists(*found / "model.config") || io::path_exists(*found / "manifest.xml");
+    const auto file = described ? std::nullopt : model_file(*found);
+    return file ? file->string() : found->string();
+  };
+  config.SetFindCallback(find);
+  const FindCallback global(find);
+  auto document = std::make_shared<sdf::SDF>();
+  sdf::init(document);
+  const ConsoleCapture console;
+  sdf::Errors errors;
+  const bool read = sdf::readFile(file_.string(), config, document, errors);
+  const std::string printed = console.text();
+  if (!errors.empty()) {
+    // The returned error has the line, the printed one what was found there.
+    Error error = error_of(errors.front(), file_);
+    if (const auto detail = printed_error(printed)) error.message += fmt::format(" ({})", *detail);
+    return error;
   }
   if (const auto error = printed_error(printed)) return Error{fmt::format("{}: {}", file_.string(), *error)};
-  if (const Status s = check_numbers(root.Element(), file_.string()); !s) return s.error();
-  world_.warnings = unsupported_elements(root.Element(), file_.string());
+  if (!read) return Error{fmt::format("{}: found no SDF document", file_.string())};
+  return document;
+}
+
+Result<World> Reader::read() {
+  if (const Status status = check_sdf_files(file_, resources_); !status) return status.error();
+  const auto document = parse();
+  if (!document) return document.error();
+  const sdf::ElementPtr element = (*document)->Root();
+  if (const Status s = check_numbers(element, file_.string()); !s) return s.error();
+  world_.warnings = unsupported_elements(element, file_.string());
+  for (std::string& repaired : repair_sdf(element, file_.string()))
+    world_.warnings.push_back(std::move(repaired));
+  sdf::Root root;
+  {
+    const ConsoleCapture console;
+    for (const sdf::Error& error : root.Load(*document)) {
+      if (!is_harmless(error)) return error_of(error, file_);
+      world_.warnings.push_back(error_of(error, file_).message);
+    }
+  }
   if (root.WorldCount() > 0) {
-    const sdf::World& world = *root.WorldByIndex(0);
-    world_.name = world.Name();
-    if (const sdf::Scene* scene = world.Scene()) {
-      world_.ambient = linear_colour(scene->Ambient());
-      world_.background = linear_colour(scene->Background());
-      world_.sky = scene->Sky() != nullptr;
-    }
-    for (std::uint64_t i = 0; i < world.LightCount(); ++i) add_light(*world.LightByIndex(i));
-    for (std::uint64_t i = 0; i < world.ModelCount(); ++i) {
-      if (const Status s = add_model(*world.ModelByIndex(i), {}, ""); !s) return s.error();
-    }
-    if (!world_.sun)
-      world_.warnings.push_back(
-          fmt::format("{}: no directional light: the world is lit by ambient light alone", file_.string()));
+    if (element->HasElement("world")) state_ = read_state(element->GetElement("world"), file_.string());
+    if (const Status s = add_world(*root.WorldByIndex(0)); !s) return s.error();
   } else if (root.Model() != nullptr) {
     world_.name = root.Model()->Name();
     world_.sun = Sun{};
-    if (const Status s = add_model(*root.Model(), {}, ""); !s) return s.error();
+    if (const Status s = add_model(*root.Model(), {}, {}, ""); !s) return s.error();
   } else {
     return Error{fmt::format("{}: found neither a world nor a model", file_.string())};
   }
   return std::move(world_);
+}
+
+Status Reader::add_world(const sdf::World& world) {
+  world_.name = world.Name();
+  if (const sdf::Scene* scene = world.Scene()) {
+    world_.ambient = linear_colour(scene->Ambient());
+    world_.background = linear_colour(scene->Background());
+    world_.sky = scene->Sky() != nullptr;
+  }
+  for (std::uint64_t i = 0; i < world.LightCount(); ++i) add_light(*world.LightByIndex(i));
+  for (std::uint64_t i = 0; i < world.ModelCount(); ++i) {
+    const sdf::Model& model = *world.ModelByIndex(i);
+    const auto& gone = state_.deletions;
+    if (std::find(gone.begin(), gone.end(), model.Name()) != gone.end()) continue;
+    if (const Status s = add_model(model, {}, {}, ""); !s) return s;
+  }
+  for (const sdf::ElementPtr& inserted : state_.insertions) {
+    if (const Status s = add_inserted(inserted); !s) return s;
+  }
+  for (std::string& warning : state_.warnings) world_.warnings.push_back(std::move(warning));
+  if (!world_.sun) {
+    world_.warnings.push_back(
+        fmt::format("{}: no directional light: the world is lit by ambient light alone", file_.string()));
+  }
+  return {};
+}
+
+Status Reader::add_inserted(const sdf::ElementPtr& element) {
+  sdf::Model model;
+  for (const sdf::Error& error : model.Load(element)) {
+    if (!is_harmless(error)) return error_of(error, file_);
+  }
+  return add_model(model, {}, {}, "");
+}
+
+Pose Reader::placed(const std::string& name, const Pose& otherwise) const {
+  const auto found = state_.poses.find(name);
+  return found == state_.poses.end() ? otherwise : found->second;
 }
 
 void Reader::add_light(const sdf::Light& light) {
@@ -148,30 +236,59 @@ void Reader::add_light(const sdf::Light& light) {
   world_.sun = sun;
 }
 
-Status Reader::add_model(const sdf::Model& model, const Pose& T_world_parent, const std::string& prefix) {
-  const Pose T_world_model = T_world_parent * resolved(model.SemanticPose(), model.RawPose());
-  const std::string name = prefix + model.Name() + "::";
+Status Reader::add_model(const sdf::Model& model, const Pose& T_world_parent, const Pose& T_top_parent,
+                         const std::string& prefix) {
+  const std::string own = prefix + model.Name();
+  const Pose T_parent_model = resolved(model.SemanticPose(), model.RawPose());
+  const Pose T_world_model = placed(own, T_world_parent * T_parent_model);
+  const Pose T_top_model = prefix.empty() ? Pose{} : T_top_parent * T_parent_model;
+  const std::string name = own + "::";
   for (std::uint64_t i = 0; i < model.LinkCount(); ++i) {
     const sdf::Link& link = *model.LinkByIndex(i);
-    if (const Status s = add_link(link, T_world_model, name); !s) return s.error();
     const Pose T_model_link = resolved(link.SemanticPose(), link.RawPose());
+    const Pose T_world_link = placed(name + link.Name(), T_world_model * T_model_link);
+    if (const Status s = add_link(link, T_world_link, name); !s) return s;
     for (std::uint64_t k = 0; k < link.SensorCount(); ++k) {
-      if (const Status s = add_sensor(*link.SensorByIndex(k), T_model_link, name); !s) return s.error();
+      const sdf::Sensor& sensor = *link.SensorByIndex(k);
+      const Pose T_link_sensor = resolved(sensor.SemanticPose(), sensor.RawPose());
+      const Status s = add_sensor(sensor, T_top_model * T_model_link * T_link_sensor, name + sensor.Name(),
+                                  file_.string(), world_);
+      if (!s) return s;
     }
   }
   for (std::uint64_t i = 0; i < model.ModelCount(); ++i) {
-    if (const Status s = add_model(*model.ModelByIndex(i), T_world_model, name); !s) return s.error();
+    if (const Status s = add_model(*model.ModelByIndex(i), T_world_model, T_top_model, name); !s) return s;
   }
   return {};
 }
 
-Status Reader::add_link(const sdf::Link& link, const Pose& T_world_model, const std::string& prefix) {
-  const Pose T_world_link = T_world_model * resolved(link.SemanticPose(), link.RawPose());
+Status Reader::add_link(const sdf::Link& link, const Pose& T_world_link, const std::string& prefix) {
   for (std::uint64_t i = 0; i < link.VisualCount(); ++i) {
     if (const Status s = add_visual(*link.VisualByIndex(i), T_world_link, prefix + link.Name() + "::"); !s)
       return s.error();
   }
   for (std::uint64_t i = 0; i < link.LightCount(); ++i) add_light(*link.LightByIndex(i));
+  return {};
+}
+
+Status Reader::add_polylines(const sdf::ElementPtr& geometry, const Visual& visual) {
+  for (sdf::ElementPtr line = geometry->GetElement("polyline"); line;
+       line = line->GetNextElement("polyline")) {
+    std::vector<Eigen::Vector2d> points;
+    for (sdf::ElementPtr point = line->HasElement("point") ? line->GetElement("point") : nullptr; point;
+         point = point->GetNextElement("point")) {
+      const auto p = point->Get<ignition::math::Vector2d>();
+      points.emplace_back(p.X(), p.Y());
+    }
+    auto mesh = extrude(std::move(points), line->HasElement("height") ? line->Get<double>("height") : 1.0);
+    if (!mesh) {
+      return Error{fmt::format("{}: visual '{}': <polyline>: {}", place_of(line, file_.string()), visual.name,
+                               mesh.error().message)};
+    }
+    Visual piece = visual;
+    piece.shape = Mesh{std::make_shared<TriangleMesh>(std::move(*mesh)), Eigen::Vector3d::Ones()};
+    world_.visuals.push_back(std::move(piece));
+  }
   return {};
 }
 
@@ -204,9 +321,42 @@ Status Reader::read_pattern(const sdf::ElementPtr& element, Material& material) 
   return {};
 }
 
-Result<Material> Reader::material_of(const sdf::Material& source) const {
+/// The diffuse colour that the file gives, else what follows from what it does say.
+void Reader::choose_colour(const sdf::Material& source, Material& material) {
+  const sdf::ElementPtr element = source.Element();
+  const auto says = [&](const char* name) { return element && element->HasElement(name); };
+  const std::string script = source.ScriptName();
+  const bool told = !script_told_.insert(script).second;  // once per material is enough
+  const auto warn = [&](const std::string& text) {
+    if (told) return;
+    world_.warnings.push_back(
+        fmt::format("{}: <material>: <script> {}", place_of(element, file_.string()), text));
+  };
+  if (says("diffuse")) {
+    material.colour = linear_colour(source.Diffuse());
+    if (!script.empty()) warn(fmt::format("{} is left out: the <diffuse> colour is taken", script));
+    return;
+  }
+  if (says("pbr") || says("pade:pattern")) return;  // the image or the pattern is the surface
+  if (const auto named = gazebo_colour(script)) {
+    for (int i = 0; i < 3; ++i) material.colour[i] = linear_from_srgb(named->srgb[i]);
+    warn(named->stands_for_image
+             ? fmt::format("{} is an image that is not at hand: its mean colour is taken", script)
+             : fmt::format("{} is drawn in its plain colour", script));
+    return;
+  }
+  const std::string unknown = script.empty() ? "gives no colour" : fmt::format("{} is not known", script);
+  if (says("ambient")) {
+    material.colour = linear_colour(source.Ambient());
+    warn(fmt::format("{}: the <ambient> colour is taken, as there is no <diffuse>", unknown));
+  } else {
+    warn(fmt::format("{}: a light grey is taken, as there is no <diffuse>", unknown));
+  }
+}
+
+Result<Material> Reader::material_of(const sdf::Material& source) {
   Material material;
-  material.colour = linear_colour(source.Diffuse());
+  choose_colour(source, material);
   std::string image;
   if (const sdf::Pbr* pbr = source.PbrMaterial()) {
     for (const auto type : {sdf::PbrWorkflowType::METAL, sdf::PbrWorkflowType::SPECULAR}) {
@@ -223,6 +373,8 @@ Result<Material> Reader::material_of(const sdf::Material& source) const {
     if (!pixels) return pixels.error();
     material.image = std::move(pixels).value();
     material.image_file = *found;
+    if (!source.Element() || !source.Element()->HasElement("diffuse"))
+      material.colour = Eigen::Vector3d::Ones();
   }
   if (const Status s = read_pattern(source.Element(), material); !s) return s.error();
   return material;
@@ -266,9 +418,12 @@ Status Reader::add_visual(const sdf::Visual& source, const Pose& T_world_link, c
       return add_mesh(*geometry->MeshShape(), std::move(visual), has_material);
     case sdf::GeometryType::EMPTY:
       if (geometry->Element() && geometry->Element()->HasElement("empty")) return {};
+      if (geometry->Element() && geometry->Element()->HasElement("polyline")) {
+        return add_polylines(geometry->Element(), visual);
+      }
       return Error{
           fmt::format("{}: visual '{}': found no shape that is known, expected box, sphere, cylinder, "
-                      "capsule, ellipsoid, plane or mesh",
+                      "capsule, ellipsoid, plane, polyline or mesh",
                       place_of(geometry->Element(), file_.string()), visual.name)};
     default:
       world_.warnings.push_back(
@@ -286,11 +441,15 @@ Status Reader::add_mesh(const sdf::Mesh& mesh, Visual visual, bool has_material)
         fmt::format("{}: visual '{}': found mesh '{}', which is neither beside it nor in a resource folder",
                     place_of(mesh.Element(), file_.string()), visual.name, mesh.Uri())};
   }
-  auto known = meshes_.find(file->string());
+  const SubMesh wanted{mesh.Submesh(), mesh.CenterSubmesh()};
+  auto known = meshes_.find({file->string(), wanted});
   if (known == meshes_.end()) {
-    auto parts = read_mesh(*file, world_.warnings);
-    if (!parts) return parts.error();
-    known = meshes_.emplace(file->string(), std::move(parts).value()).first;
+    auto parts = read_mesh(*file, wanted, resources_, world_.warnings);
+    if (!parts) {
+      return Error{fmt::format("{}: visual '{}': {}", place_of(mesh.Element(), file_.string()), visual.name,
+                               parts.error().message)};
+    }
+    known = meshes_.emplace(std::pair{file->string(), wanted}, std::move(parts).value()).first;
   }
   for (const MeshPart& part : known->second) {
     Visual piece = visual;
@@ -301,67 +460,9 @@ Status Reader::add_mesh(const sdf::Mesh& mesh, Visual visual, bool has_material)
   return {};
 }
 
-Status Reader::add_sensor(const sdf::Sensor& sensor, const Pose& T_model_link, const std::string& prefix) {
-  const std::string name = prefix + sensor.Name();
-  const Pose T_model_sensor = T_model_link * resolved(sensor.SemanticPose(), sensor.RawPose());
-  if (const sdf::Camera* source = sensor.CameraSensor()) {
-    CameraSensor camera;
-    camera.name = name;
-    if (sensor.UpdateRate() > 0) camera.rate = sensor.UpdateRate();
-    // Gazebo's camera looks along the x axis of its frame.
-    camera.T_body_camera =
-        T_model_sensor * Pose{Eigen::Quaterniond(forward_camera_rotation()), Eigen::Vector3d::Zero()};
-    camera.colour = source->PixelFormat() != sdf::PixelFormatType::L_INT8 &&
-                    source->PixelFormat() != sdf::PixelFormatType::L_INT16;
-    Camera& c = camera.camera;
-    c.width = static_cast<int>(source->ImageWidth());
-    c.height = static_cast<int>(source->ImageHeight());
-    c.fx = c.fy = 0.5 * c.width / std::tan(0.5 * source->HorizontalFov().Radian());
-    c.cx = 0.5 * (c.width - 1);
-    c.cy = 0.5 * (c.height - 1);
-    if (source->HasLensIntrinsics()) {
-      c.fx = source->LensIntrinsicsFx();
-      c.fy = source->LensIntrinsicsFy();
-      c.cx = source->LensIntrinsicsCx();
-      c.cy = source->LensIntrinsicsCy();
-    }
-    c.coefficients = {source->DistortionK1(), source->DistortionK2(), source->DistortionP1(),
-                      source->DistortionP2(), source->DistortionK3()};
-    const bool distorted = source->DistortionK1() != 0 || source->DistortionK2() != 0 ||
-                           source->DistortionK3() != 0 || source->DistortionP1() != 0 ||
-                           source->DistortionP2() != 0;
-    if (distorted) c.distortion = Distortion::plumb_bob;
-    if (c.width < 1 || c.height < 1 || c.width > 16384 || c.height > 16384 || !(c.fx > 0) || !(c.fy > 0)) {
-      return Error{fmt::format(
-          "{}: camera '{}': found {} x {} pixels with focal lengths {} and {}, expected positive numbers",
-          file_.string(), name, c.width, c.height, c.fx, c.fy)};
-    }
-    if (source->ImageNoise().Type() == sdf::NoiseType::GAUSSIAN)
-      camera.noise_deviation = source->ImageNoise().StdDev();
-    world_.cameras.push_back(std::move(camera));
-  } else if (const sdf::Imu* source_imu = sensor.ImuSensor()) {
-    ImuSensor imu;
-    imu.name = name;
-    if (sensor.UpdateRate() > 0) imu.rate = sensor.UpdateRate();
-    // SDF gives the deviation of a sample; the model wants the density.
-    const auto read = [&](const sdf::Noise& noise, TriadErrors& errors) {
-      errors.noise_density = noise.StdDev() / std::sqrt(imu.rate);
-      errors.turn_on_bias = std::hypot(noise.BiasMean(), noise.BiasStdDev());
-      errors.bias_instability = noise.DynamicBiasStdDev();
-      errors.bias_correlation_time = noise.DynamicBiasCorrelationTime();
-    };
-    read(source_imu->AngularVelocityXNoise(), imu.model.gyroscope);
-    read(source_imu->LinearAccelerationXNoise(), imu.model.accelerometer);
-    world_.imus.push_back(std::move(imu));
-  } else {
-    world_.warnings.push_back(
-        fmt::format("{}: sensor '{}' is neither a camera nor an IMU and left out", file_.string(), name));
-  }
-  return {};
-}
-
 void append_environment_paths(ResourcePaths& resources) {
-  for (const char* variable : {"GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "SDF_PATH"}) {
+  for (const char* variable : {"GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH",
+                               "GAZEBO_RESOURCE_PATH", "SDF_PATH"}) {
     const char* value = std::getenv(variable);
     std::istringstream list(value != nullptr ? value : "");
     for (std::string folder; std::getline(list, folder, ':');) {
@@ -382,6 +483,9 @@ Result<World> read_sdf(const fs::path& file, const ResourcePaths& resources) {
   ResourcePaths all = {absolute.parent_path() / "models"};
   all.insert(all.end(), resources.begin(), resources.end());
   append_environment_paths(all);
+  all.push_back(absolute.parent_path().parent_path() / "models");  // worlds/ and models/ side by side
+  const BuiltinModels builtin;
+  if (!builtin.folder().empty()) all.emplace_back(builtin.folder());
   return Reader(absolute, std::move(all)).read();
 }
 

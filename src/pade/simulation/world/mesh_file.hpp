@@ -2,9 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "pade/core/result.hpp"
+#include "pade/simulation/sdf/sdf_files.hpp"
 #include "pade/simulation/world/world.hpp"
 
 namespace pade::simulation {
@@ -15,10 +18,21 @@ struct MeshPart {
   Material material;  ///< as the file says; images are read from beside it
 };
 
-/// Refuses a missing or unreadable file and one without a triangle. A material image that cannot be read is
-/// named in `warnings`.
-Result<std::vector<MeshPart>> read_mesh(const std::filesystem::path& file,
-                                        std::vector<std::string>& warnings);
+/// A part of a mesh file by its name, as Gazebo's <submesh> asks for it.
+struct SubMesh {
+  std::string name;      ///< of the node (COLLADA) or the object (OBJ); empty = the whole file
+  bool centred = false;  ///< its bounding box is moved to the origin
+  bool operator<(const SubMesh& other) const {
+    return std::tie(name, centred) < std::tie(other.name, other.centred);
+  }
+};
+
+/// Vertices as they stand in the file, times the unit of a COLLADA file: its up axis changes nothing, as in
+/// Gazebo. Refuses a missing or unreadable file, one without a triangle, and an unknown part. A material
+/// image is looked for where Gazebo looks: beside the file, in materials/textures beside its folder, and in
+/// the `resources`; one that cannot be read is named in `warnings`.
+Result<std::vector<MeshPart>> read_mesh(const std::filesystem::path& file, const SubMesh& part,
+                                        const ResourcePaths& resources, std::vector<std::string>& warnings);
 
 /// An 8-bit colour image. Refuses what is missing or no image.
 Result<std::shared_ptr<const cv::Mat>> read_texture_image(const std::filesystem::path& file);

@@ -3,10 +3,13 @@
 #include <charconv>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "pade/io/sequence/calibration_fields.hpp"
+#include "pade/io/sequence/dialects/pose_dialects.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/yaml.hpp"
@@ -47,15 +50,15 @@ Result<Trajectory> read_euroc_poses(const fs::path& file, ReadReport& report) {
 }
 
 /// The poses of the body, and the file they are in.
-Result<Trajectory> choose_poses(const fs::path& mav, const std::string& choice, fs::path& file,
-                                ReadReport& report) {
+Result<Trajectory> choose_poses(const fs::path& mav, const std::string& choice, std::span<const Time> images,
+                                fs::path& file, ReadReport& report) {
   if (choice == "original") {
     return Error{fmt::format(
         "{}: the EuRoC layout has no original poses, expected groundtruth or a pose file", mav.string())};
   }
   if (choice != "groundtruth") {
     file = choice;
-    return file.extension() == ".csv" ? read_euroc_poses(file, report) : read_trajectory(file, report);
+    return read_any_poses(file, images, report);
   }
   file = mav / "state_groundtruth_estimate0" / "data.csv";
   if (path_exists(file)) return read_euroc_poses(file, report);
@@ -67,9 +70,12 @@ Result<Trajectory> choose_poses(const fs::path& mav, const std::string& choice, 
     if (!T_world_vicon) return T_world_vicon;
     return T_world_vicon->transformed(Pose{}, T_body_vicon->inverse());
   }
+  file = mav / "mocap0" / "data.csv";  // TUM-VI: poses of the IMU
+  if (path_exists(file)) return read_euroc_poses(file, report);
   const bool leica = path_exists(mav / "leica0" / "data.csv");
-  return Error{fmt::format("{}: {}, expected state_groundtruth_estimate0/data.csv or vicon0/data.csv",
-                           mav.string(), leica ? "leica0 has positions without orientation" : "no poses")};
+  return Error{
+      fmt::format("{}: {}, expected state_groundtruth_estimate0/data.csv, vicon0/data.csv or mocap0/data.csv",
+                  mav.string(), leica ? "leica0 has positions without orientation" : "no poses")};
 }
 
 }  // namespace
@@ -142,7 +148,9 @@ Result<SequenceListing> read_euroc_layout(const fs::path& folder, const LayoutCh
   listing.images = parse_euroc_images(*text, camera / "data.csv", report);
 
   if (choice.computed) return listing;
-  auto trajectory = choose_poses(mav, choice.poses, listing.pose_file, report);
+  std::vector<Time> times;
+  for (const StampedFile& image : listing.images) times.push_back(image.time);
+  auto trajectory = choose_poses(mav, choice.poses, times, listing.pose_file, report);
   if (!trajectory) return trajectory.error();
   listing.trajectory = std::move(*trajectory);
   listing.poses_of_body = listing.calibration.pose_convention != PoseConvention::camera_to_world_optical;

@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "pade/io/sequence/dialects/pose_dialects.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
 #include "pade/io/text.hpp"
 
@@ -76,10 +77,12 @@ Result<Trajectory> read_poses(const fs::path& file, const std::vector<std::optio
   const auto text = read_file(file);
   if (!text) return text.error();
   const auto lines = data_lines(*text);
-  if (!lines.empty() && split_fields(lines.front().text).size() == 8) {
-    return parse_trajectory(*text, file.string(), report);  // a TUM file given by option
+  if (lines.empty() || split_fields(lines.front().text).size() == 12) {
+    return parse_kitti_poses(*text, file.string(), times, report);
   }
-  return parse_kitti_poses(*text, file.string(), times, report);
+  std::vector<Time> images;
+  for (const auto& time : times) images.push_back(time.value_or(Time{}));
+  return parse_any_poses(*text, file.string(), images, report);  // another dialect, given by option
 }
 
 }  // namespace

@@ -36,8 +36,8 @@ void override_with(Calibration& base, const Calibration& other) {
 }  // namespace
 
 std::vector<fs::path> image_files(const fs::path& folder) {
-  static constexpr std::array<std::string_view, 9> kExtensions = {".png", ".jpg", ".jpeg", ".pgm", ".ppm",
-                                                                  ".pnm", ".bmp", ".tif",  ".tiff"};
+  static constexpr std::array<std::string_view, 10> kExtensions = {".png", ".jpg", ".jpeg", ".pgm",  ".ppm",
+                                                                   ".pnm", ".bmp", ".tif",  ".tiff", ".webp"};
   std::vector<fs::path> files;
   std::error_code failure;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
@@ -62,8 +62,15 @@ Result<Calibration> with_overrides(Calibration base, const fs::path& folder, con
   if (path_exists(folder / "camera.yaml")) files.push_back(folder / "camera.yaml");
   if (!choice.calibration_file.empty()) files.push_back(choice.calibration_file);
   for (const fs::path& file : files) {
-    const auto read = read_calibration(file);
+    const bool asked_for = !choice.calibration_file.empty() && file == files.back();
+    const auto read = read_calibration(file, asked_for ? choice.camera : 0);
     if (!read) return read.error();
+    if (asked_for && !read->camera) {
+      return Error{
+          fmt::format("{}: found no camera in it, expected the calibration that was asked for (known "
+                      "dialects: docs/formats.md)",
+                      file.string())};
+    }
     override_with(base, *read);
     for (const std::string& field : read->unknown_fields) {
       report.notes.push_back(fmt::format("{}: field {} is unknown and was ignored", file.string(), field));
@@ -84,13 +91,14 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
   for (const char* name : {"image_0", "image_1", "image_2", "image_3"}) {
     if (path_exists(folder / name)) return read_kitti_layout(folder, choice, report);
   }
-  for (const char* name : {"rgb", "rgb.txt", "associations.txt"}) {
+  for (const char* name : {"rgb", "rgb.txt", "associations.txt", "images", "images.txt", "image", "color",
+                           "colour", "image_left"}) {
     if (path_exists(folder / name)) return read_tum_layout(folder, choice, report);
   }
-  return Error{
-      fmt::format("{}: no known layout, expected rgb/ (TUM RGB-D), mav0/cam0/ (EuRoC), or image_0/ or "
-                  "image_2/ (KITTI odometry)",
-                  folder.string())};
+  return Error{fmt::format(
+      "{}: no known layout, expected rgb/ or images/ (TUM RGB-D), mav0/cam0/ (EuRoC), or image_0/ or "
+      "image_2/ (KITTI odometry)",
+      folder.string())};
 }
 
 }  // namespace pade::io

@@ -41,6 +41,7 @@ struct LayoutChoice {
   std::string poses;                       ///< groundtruth, original or a file
   std::filesystem::path calibration_file;  ///< empty = the layout's own
   bool computed = false;                   ///< the poses come from elsewhere: none are read
+  int camera = 0;                          ///< of a calibration file that holds several
 };
 
 Result<SequenceListing> read_tum_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
@@ -58,7 +59,7 @@ Result<SequenceListing> read_layout(const std::filesystem::path& folder, const L
 std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder);
 
 /// `base`, the layout's own calibration, with what camera.yaml in `folder` and then the calibration file of
-/// the options say instead.
+/// the options say instead. That file must describe a camera: it was asked for.
 Result<Calibration> with_overrides(Calibration base, const std::filesystem::path& folder,
                                    const LayoutChoice& choice, ReadReport& report);
 

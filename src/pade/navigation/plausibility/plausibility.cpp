@@ -1,0 +1,404 @@
+#include "pade/navigation/plausibility/plausibility.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "pade/navigation/plausibility/force_match.hpp"
+
+namespace pade::navigation {
+namespace {
+
+using Eigen::Matrix3d;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void add(std::vector<Hint>& hints, std::string id, HintSeverity severity, std::string message,
+         std::string advice) {
+  hints.push_back({std::move(id), severity, std::move(message), std::move(advice)});
+}
+
+/// First and last stamp of a sensor, in whatever order.
+struct Span {
+  double first = std::numeric_limits<double>::infinity();
+  double last = -std::numeric_limits<double>::infinity();
+  [[nodiscard]] bool empty() const { return first > last; }
+};
+
+template <class Samples>
+Span span_of(const Samples& samples) {
+  Span span;
+  for (const auto& sample : samples) {
+    span.first = std::min(span.first, sample.time.seconds());
+    span.last = std::max(span.last, sample.time.seconds());
+  }
+  return span;
+}
+
+void check_overlap(const NavigationLog& log, std::vector<Hint>& hints) {
+  const Span imu = span_of(log.imu);
+  const std::array<std::pair<const char*, Span>, 4> others = {
+      {{"GNSS velocities", span_of(log.gnss.velocities)},
+       {"GNSS positions", span_of(log.gnss.fixes)},
+       {"barometer", span_of(log.barometer)},
+       {"magnetometer", span_of(log.magnetometer)}}};
+  for (const auto& [name, span] : others) {
+    if (imu.empty() || span.empty()) continue;
+    const double common = std::min(imu.last, span.last) - std::max(imu.first, span.first);
+    const std::string covers = fmt::format("{} cover {:.1f} to {:.1f} s, the IMU {:.1f} to {:.1f} s", name,
+                                           span.first, span.last, imu.first, imu.last);
+    if (common <= 0) {
+      add(hints, "no-overlap", HintSeverity::error, covers + ": no overlap",
+          "the clocks differ: give all logs the same zero, or the stamps of one are in another unit");
+    } else if (common < 0.5 * (imu.last - imu.first)) {
+      add(hints, "no-overlap", HintSeverity::warning,
+          fmt::format("{}: they share {:.0f} s only", covers, common),
+          "see whether the clocks differ; what lies outside is navigated without this sensor");
+    }
+  }
+}
+
+void check_stamps_go_back(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) {
+  constexpr double kReset = 0.5;  // s; less is jitter
+  for (std::size_t i = 1; i < imu.size(); ++i) {
+    const double step = seconds_between(imu[i - 1].time, imu[i].time);
+    if (step > -kReset) continue;
+    add(hints, "stamps-go-back", HintSeverity::error,
+        fmt::format("the stamps of the IMU go back by {:.3f} s at sample {} of {}, from {:.3f} to {:.3f} s: "
+                    "its clock "
+                    "was set anew, and every sample until it has caught up is refused",
+                    -step, i + 1, imu.size(), imu[i - 1].time.seconds(), imu[i].time.seconds()),
+        "cut the log there, or add the jump to the stamps behind it");
+    return;
+  }
+}
+
+void check_rate(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) {
+  constexpr double kSlow = 80;        // Hz
+  constexpr double kVibration = 1.5;  // m/s²
+  std::vector<double> steps;
+  std::vector<double> bends;
+  for (std::size_t i = 2; i < imu.size(); ++i) {
+    steps.push_back(seconds_between(imu[i - 1].time, imu[i].time));
+    const Vector3d bend = imu[i].specific_force - 2 * imu[i - 1].specific_force + imu[i - 2].specific_force;
+    bends.push_back(bend.norm());
+  }
+  if (steps.size() < 100) return;
+  const double rate = 1 / median(std::move(steps));
+  // The norm of three components of variance 6 s², at its median.
+  const double spread = median(std::move(bends)) / (1.538 * std::sqrt(6.0));
+  if (rate > kSlow || spread < kVibration) return;
+  add(hints, "imu-picked", HintSeverity::warning,
+      fmt::format(
+          "the IMU has {:.0f} samples per second that differ by {:.1f} m/s² from one to the next: they look "
+          "picked from a faster stream, so that vibration appears as motion",
+          rate, spread),
+      "log the IMU at its full rate, or its integrated increments, or filter before picking");
+}
+
+void check_upright(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) {
+  Vector3d mean = Vector3d::Zero();
+  for (const ImuSample& sample : imu) mean += sample.specific_force;
+  if (imu.empty()) return;
+  mean /= static_cast<double>(imu.size());
+  if (mean.z() > -0.8 * mean.norm() || mean.norm() < 5) return;
+  add(hints, "upside-down", HintSeverity::warning,
+      fmt::format("the mean specific force is {:.1f} m/s² along the body's z, which is up: the vehicle would "
+                  "fly upside "
+                  "down",
+                  mean.z()),
+      "where the log is in forward, right, down, write '# frame=FRD' into its first line");
+}
+
+/// The mean velocity between two fixes, from the velocities in between.
+void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
+  constexpr double kStep = 2;  // s
+  double path = 0, along = 0, along_swapped = 0, moved2 = 0, flown2 = 0, noise2 = 0, farthest = 0;
+  std::size_t next = 0;
+  const GnssFix* last = nullptr;
+  Vector3d flown = Vector3d::Zero();
+  const GnssVelocity* before = nullptr;
+  for (const GnssFix& fix : gnss.fixes) {
+    for (; next < gnss.velocities.size() && gnss.velocities[next].time <= fix.time; ++next) {
+      const GnssVelocity& v = gnss.velocities[next];
+      if (before != nullptr)
+        flown += 0.5 * seconds_between(before->time, v.time) * (before->velocity + v.velocity);
+      before = &v;
+    }
+    farthest = std::max(farthest, fix.position.head<2>().cwiseAbs().maxCoeff());
+    const double gap = last == nullptr ? 0 : seconds_between(last->time, fix.time);
+    if (last != nullptr && gap < kStep) continue;
+    if (last != nullptr && gap < 3 * kStep) {
+      const Vector3d moved = fix.position - last->position;
+      path += flown.norm();
+      along += moved.dot(flown);
+      along_swapped += moved.dot(Vector3d(flown.y(), flown.x(), -flown.z()));
+      moved2 += moved.squaredNorm();
+      flown2 += flown.squaredNorm();
+      noise2 += fix.covariance.trace() + last->covariance.trace();
+    }
+    last = &fix;
+    flown.setZero();
+  }
+  constexpr double kLeastPath = 30;  // m
+  if (path < kLeastPath || flown2 == 0) return;
+  const double scale = along / flown2;
+  const double agreement = along / std::sqrt(moved2 * flown2 + 1e-12);
+  if (std::sqrt(moved2 / flown2) < 1e-3 && farthest <= 360) {
+    return add(
+        hints, "gnss-degrees", HintSeverity::error,
+        fmt::format("the velocities fly {:.0f} m while the positions move by {:.2g} of that: they look like "
+                    "latitude and longitude",
+                    path, std::sqrt(moved2 / flown2)),
+        "name the columns lat, lon, alt, and they become metres around the first fix");
+  }
+  // What the errors of the positions explain is no contradiction.
+  if (moved2 + flown2 - 2 * along < 2 * noise2) return;
+  if (along_swapped > 1.3 * std::max(along, 0.0) && along_swapped > 0.7 * std::sqrt(moved2 * flown2)) {
+    return add(
+        hints, "gnss-axes", HintSeverity::error,
+        "the velocities fit the positions when read as north, east, down: positions and velocities are in "
+        "different axes",
+        "name the columns (pE pN pU, vN vE vD), so that each is read in its own axes");
+  }
+  if (agreement > 0.8 && scale > 0.7 && scale < 1.4) return;
+  const std::string unit = agreement > 0.8 && scale > 0.24 && scale < 0.32   ? " (km/h?)"
+                           : agreement > 0.8 && scale > 0.47 && scale < 0.56 ? " (knots?)"
+                           : agreement > 0.8 && scale < 0.02                 ? " (cm/s?)"
+                                                                             : "";
+  add(hints, "gnss-contradiction", HintSeverity::error,
+      fmt::format("positions and velocities of the GNSS do not belong together: the positions move by {:.2f} "
+                  "of what the "
+                  "velocities fly{}, with an agreement of {:.2f} (1 is the same)",
+                  scale, unit, agreement),
+      "see which of the two is wrong: axes, unit (m/s), or the clock of one of them");
+}
+
+/// What of the readings of IMU and GNSS fits best.
+void check_readings(const NavigationLog& log, std::vector<Hint>& hints) {
+  const ForceMatch given(log, with_bias(log, {}));
+  const double as_given = given.misfit();
+  if (!std::isfinite(as_given)) return;
+  constexpr double kSuspicious = 1.0;  // m/s²
+  constexpr double kClearly = 0.5;
+  struct Candidate {
+    Reading reading;
+    const char* id;
+    const char* what;
+    const char* advice;
+  };
+  constexpr double kDegree = 0.017453292519943295;
+  const std::array candidates = {
+      Candidate{{kDegree, false, Vector3d::Zero(), false},
+                "gyro-unit",
+                "when the angular rates are read as deg/s",
+                "convert the angular rates to rad/s, or write the unit into the heading (gx [deg/s])"},
+      Candidate{{1, true, Vector3d::Zero(), false},
+                "gyro-axes",
+                "when y and z of the angular rates are turned round",
+                "gyroscopes and accelerometers are in different axes (FLU and FRD): convert one of them"},
+      Candidate{{1, false, Vector3d::Zero(), true},
+                "gnss-axes",
+                "when the GNSS velocities are read as north, east, down",
+                "write '# frame=NED' into the first line of the GNSS log, or name its columns vN vE vD"}};
+  const Candidate* best = nullptr;
+  double least = kClearly * as_given;
+  for (const Candidate& candidate : candidates) {
+    if (as_given <= kSuspicious) break;
+    const double misfit = ForceMatch(log, with_bias(log, candidate.reading)).misfit();
+    if (misfit < least) {
+      least = misfit;
+      best = &candidate;
+    }
+  }
+  if (best != nullptr) {
+    return add(
+        hints, best->id, HintSeverity::error,
+        fmt::format("IMU and GNSS contradict each other by {:.1f} m/s² as given, and by {:.2f} m/s² {}",
+                    as_given, least, best->what),
+        best->advice);
+  }
+  if (const auto lag = given.lag(); lag) {
+    const bool leap = std::abs(std::abs(lag->seconds) - 18) < 1 || std::abs(std::abs(lag->seconds) - 37) < 1;
+    return add(
+        hints, "gnss-lag", std::abs(lag->seconds) > 1 ? HintSeverity::error : HintSeverity::warning,
+        fmt::format(
+            "the GNSS velocities are {:.2f} s {}: IMU and GNSS contradict each other by {:.2f} m/s² as "
+            "stamped, and by {:.2f} m/s² when moved by that{}",
+            std::abs(lag->seconds), lag->seconds > 0 ? "late" : "early", as_given, lag->misfit,
+            leap ? "; this looks like the leap seconds between GPS time and UTC (18 s) or TAI (37 s)" : ""),
+        fmt::format("give the latency (--gnss-latency {:.2f}), or correct the stamps", lag->seconds));
+  }
+  constexpr double kHopeless = 3;  // m/s²
+  if (as_given > kHopeless) {
+    add(hints, "imu-contradiction", HintSeverity::error,
+        fmt::format(
+            "IMU and GNSS contradict each other by {:.1f} m/s² (flights of good logs: under 1), and neither "
+            "another unit, other axes nor a lag explains it",
+            as_given),
+        "check the columns, axes and units of imu.csv, and that both logs are of the same flight");
+  }
+}
+
+const char* name_of(SensorKind kind) {
+  switch (kind) {
+    case SensorKind::gnss_velocity:
+      return "gnss_velocity";
+    case SensorKind::gnss_position:
+      return "gnss_position";
+    case SensorKind::barometer:
+      return "barometer";
+    case SensorKind::heading:
+      return "heading";
+    case SensorKind::magnetometer:
+      return "magnetometer";
+    case SensorKind::zero_velocity:
+      return "zero_velocity";
+    case SensorKind::range:
+      return "range";
+    case SensorKind::road:
+      return "road";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<Hint> check_log(const NavigationLog& log) {
+  std::vector<Hint> hints;
+  check_overlap(log, hints);
+  check_stamps_go_back(log.imu, hints);
+  check_rate(log.imu, hints);
+  check_upright(log.imu, hints);
+  check_positions(log.gnss, hints);
+  const bool clocks = std::any_of(hints.begin(), hints.end(), [](const Hint& hint) {
+    return hint.severity == HintSeverity::error && (hint.id == "no-overlap" || hint.id == "stamps-go-back");
+  });
+  if (!clocks) check_readings(log, hints);
+  return hints;
+}
+
+std::optional<Hint> regularise_stamps(std::vector<ImuSample>& samples) {
+  constexpr double kShare = 0.005;  // of samples that do not rise; fewer are refused one by one
+  constexpr double kReset = 0.5;    // s; a step back by more is a clock that was set anew
+  std::vector<double> steps;
+  std::size_t falling = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double step = seconds_between(samples[i - 1].time, samples[i].time);
+    if (step < -kReset) return std::nullopt;
+    if (step <= 0) ++falling;
+    steps.push_back(step);
+  }
+  if (steps.size() < 10 || static_cast<double>(falling) < kShare * static_cast<double>(steps.size())) {
+    return std::nullopt;
+  }
+  const double total = seconds_between(samples.front().time, samples.back().time);
+  const double usual = total / static_cast<double>(steps.size());
+  double largest = 0;
+  for (std::size_t begin = 0; begin < samples.size();) {
+    std::size_t end = begin + 1;
+    while (end < samples.size() &&
+           seconds_between(samples[end - 1].time, samples[end].time) < 30 * usual + 0.1)
+      ++end;
+    // A line through stamp over number.
+    const double n = static_cast<double>(end - begin);
+    const Time zero = samples[begin].time;
+    double mean_t = 0, slope = usual, sum = 0, squares = 0;
+    for (std::size_t i = begin; i < end; ++i) mean_t += seconds_between(zero, samples[i].time) / n;
+    const double mean_i = 0.5 * (n - 1);
+    for (std::size_t i = begin; i < end; ++i) {
+      const double x = static_cast<double>(i - begin) - mean_i;
+      sum += x * (seconds_between(zero, samples[i].time) - mean_t);
+      squares += x * x;
+    }
+    if (squares > 0 && sum > 0) slope = sum / squares;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double fitted = mean_t + slope * (static_cast<double>(i - begin) - mean_i);
+      largest = std::max(largest, std::abs(fitted - seconds_between(zero, samples[i].time)));
+      samples[i].time = Time{zero.nanoseconds + Time::from_seconds(fitted).nanoseconds};
+    }
+    begin = end;
+  }
+  return Hint{
+      "imu-stamps-regularised", HintSeverity::warning,
+      fmt::format(
+          "{} of {} stamps of the IMU repeat or go back: they were put on a straight line ({:.1f} Hz), "
+          "moved by at most {:.1f} ms",
+          falling, samples.size(), 1 / usual, 1e3 * largest),
+      "log the stamps of the sensor itself, with microseconds"};
+}
+
+std::vector<SensorSummary> summarise(std::span<const Measurement> measurements) {
+  std::array<SensorSummary, 8> sums;
+  std::array<double, 8> freedom{};
+  for (const Measurement& m : measurements) {
+    if (m.innovation.verdict == Verdict::unusable) continue;
+    const auto kind = static_cast<std::size_t>(m.kind);
+    SensorSummary& sum = sums[kind];
+    ++sum.measurements;
+    if (m.innovation.verdict == Verdict::rejected || m.innovation.verdict == Verdict::reacquired)
+      ++sum.refused;
+    sum.chi_square += m.innovation.chi_square;
+    freedom[kind] += m.innovation.size;
+  }
+  std::vector<SensorSummary> out;
+  for (std::size_t kind = 0; kind < sums.size(); ++kind) {
+    if (sums[kind].measurements == 0) continue;
+    sums[kind].sensor = name_of(static_cast<SensorKind>(kind));
+    sums[kind].chi_square /= std::max(freedom[kind], 1.0);
+    out.push_back(sums[kind]);
+  }
+  return out;
+}
+
+std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health& health,
+                            std::size_t imu_samples) {
+  std::vector<Hint> hints;
+  constexpr double kSomeRefused = 0.05;
+  const double refused_imu =
+      imu_samples > 0 ? static_cast<double>(health.imu_refused) / static_cast<double>(imu_samples) : 0;
+  if (refused_imu > kSomeRefused) {
+    add(hints, "imu-refused", refused_imu > 0.3 ? HintSeverity::error : HintSeverity::warning,
+        fmt::format("{:.0f} % of the IMU samples were refused: not later than the one before, or not finite",
+                    100 * refused_imu),
+        "look at the stamps of imu.csv: they must rise");
+  }
+  for (const SensorSummary& sensor : sensors) {
+    if (sensor.measurements < 10) continue;
+    const double refused = static_cast<double>(sensor.refused) / static_cast<double>(sensor.measurements);
+    constexpr double kMostRefused = 0.3;
+    constexpr double kInconsistent = 10;  // times what the sigmas allow
+    if (refused > kMostRefused) {
+      add(hints, "sensor-refused", HintSeverity::error,
+          fmt::format(
+              "{:.0f} % of {} were refused by the filter (mean χ² {:.3g} per component, 1 is consistent)",
+              100 * refused, sensor.sensor, sensor.chi_square),
+          sensor.sensor == "barometer"
+              ? "check that height_m is in metres and up; leave baro.csv out where it disturbs"
+              : "check clock, axes, units and sigmas of this sensor, and the lever arm (--lever-arm)");
+    } else if (sensor.chi_square > kInconsistent) {
+      add(hints, "inconsistent", HintSeverity::warning,
+          fmt::format("{} disagree with the filter: mean χ² {:.3g} per component where 1 is consistent",
+                      sensor.sensor, sensor.chi_square),
+          "check clock, axes and units of this sensor; sigmas that are too small look like this too");
+    }
+  }
+  if (health.restarts > 0) {
+    add(hints, "restarts", HintSeverity::warning,
+        fmt::format("the filter had to start anew {} times: the IMU log has gaps that cannot be bridged",
+                    health.restarts),
+        "record without gaps of more than 3 s");
+  }
+  return hints;
+}
+
+}  // namespace pade::navigation

@@ -1,0 +1,44 @@
+#include "pade/pipeline/checked_log.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "pade/navigation/plausibility/plausibility.hpp"
+
+namespace pade {
+
+Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
+                                    const io::NavigationLogOptions& options) {
+  auto log = io::read_navigation_log(folder, options);
+  if (!log) return log.error();
+  CheckedLog checked{std::move(*log), {}};
+  auto regularised = navigation::regularise_stamps(checked.log.imu);
+  checked.hints = navigation::check_log(checked.log);
+  if (regularised) checked.hints.push_back(std::move(*regularised));
+  return checked;
+}
+
+std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run) {
+  std::vector<Hint> hints = checked.hints;
+  const auto of_run = navigation::check_run(run.sensors, run.health, checked.log.imu.size());
+  hints.insert(hints.end(), of_run.begin(), of_run.end());
+  std::stable_sort(hints.begin(), hints.end(),
+                   [](const Hint& a, const Hint& b) { return a.severity > b.severity; });
+  return hints;
+}
+
+Error never_aligned(const std::string& folder, const CheckedLog& checked, const NavigationRun& run) {
+  std::string text = fmt::format("{}: the filter never found its attitude and yaw (status: {})", folder,
+                                 to_name(run.health.status));
+  const std::vector<Hint> hints = all_hints(checked, run);
+  for (const Hint& hint : hints) text += fmt::format("\n  {}\n  -> {}", hint.message, hint.advice);
+  if (hints.empty()) {
+    text += ", expected two seconds at rest and a heading, or GNSS velocities of a vehicle that accelerates";
+  }
+  for (const std::string& remark : checked.log.remarks) text += "\n  " + remark;
+  return Error{text};
+}
+
+}  // namespace pade

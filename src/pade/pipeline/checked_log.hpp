@@ -1,0 +1,32 @@
+// A log of navigation sensors that was checked for what it claims to be, and what to say of it and its run.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pade/core/hint.hpp"
+#include "pade/core/result.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
+#include "pade/navigation/navigation_run.hpp"
+
+namespace pade {
+
+/// A log, and what should be known of it before its results are relied on.
+struct CheckedLog {
+  NavigationLog log;
+  std::vector<Hint> hints;  ///< worst first
+};
+/// Reads a log folder, puts jittering IMU stamps on a line (navigation::regularise_stamps) and checks the log
+/// (navigation::check_log). Errors: io::read_navigation_log.
+Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
+                                    const io::NavigationLogOptions& options = {});
+
+/// The hints of a log and those of its run, worst first.
+std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run);
+
+/// Why a run has no frame: its status, and the hints of the log.
+Error never_aligned(const std::string& folder, const CheckedLog& checked, const NavigationRun& run);
+
+}  // namespace pade
