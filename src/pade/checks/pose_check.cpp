@@ -269,8 +269,8 @@ void judge(PoseCheck& check) {
 
 std::string_view name_of(PoseConvention convention) {
   constexpr std::array<std::string_view, pose_conventions.size()> names = {
-      "as given",     "inverted",    "inverse relative", "GL axes",    "FRD axes", "FLU axes",
-      "scalar first", "turned 180°", "millimetres",      "row before", "row after"};
+      "as given",     "inverted",      "inverse relative", "GL axes",    "FRD axes", "FLU axes",
+      "scalar first", "images turned", "millimetres",      "row before", "row after"};
   return names[static_cast<std::size_t>(convention)];
 }
 
