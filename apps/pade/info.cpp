@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <octomap/OcTree.h>
 
 #include "pade/checks/scene_hardness.hpp"
 #include "pade/checks/sequence_check.hpp"

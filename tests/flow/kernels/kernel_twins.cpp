@@ -245,12 +245,14 @@ void farneback_twins(Twins& twins, simd::InstructionSet set, Images& m) {
 }
 
 void confidence_twin(Twins& twins, simd::InstructionSet set, Images& m) {
-  // Waves: the same in both on the left, others in the second on the right, where no match is right.
-  const Plane first = filled(
-      kWidth, kHeight, [](int x, int y) { return 120 + 50 * std::sin(0.5 * x) + 40 * std::cos(0.4 * y); });
-  const Plane second = filled(kWidth, kHeight, [](int x, int y) {
-    return x < kWidth / 2 ? 118 + 50 * std::sin(0.5 * x) + 40 * std::cos(0.4 * y)
-                          : 120 + 60 * std::sin(0.7 * y) + 30 * std::cos(0.3 * x);
+  // A texture, the same in both on the left but for its brightness; on the right no match is right.
+  const auto waves = [](int x, int y, double k) {
+    return 120 + 40 * std::sin(k * x) + 30 * std::cos(0.8 * k * y) + 30 * std::sin(k * (0.9 * x + 1.1 * y)) +
+           25 * std::cos(k * (1.2 * x - 0.7 * y));
+  };
+  const Plane first = filled(kWidth, kHeight, [&](int x, int y) { return waves(x, y, 0.13); });
+  const Plane second = filled(kWidth, kHeight, [&](int x, int y) {
+    return x < kWidth / 2 ? waves(x, y, 0.13) - 2 : waves(y, x, 0.4);
   });
   ConfidenceInput input;
   input.first = first.view();

@@ -1,6 +1,7 @@
 // Logs of navigation sensors, in our own layout and in those of the recordings that we test with. Everything
-// is converted to the project's frames here (body FLU, world ENU), and nowhere else. Columns are found by the exact
-// names of the dialects in docs/formats.md; a file of another layout, or one that does not say its frame, is refused.
+// is converted to the project's frames here (body FLU, world ENU), and nowhere else. Columns are found by the
+// exact names of the dialects in docs/formats.md; a file of another layout, or one that does not say its
+// frame, is refused.
 #pragma once
 
 #include <cstddef>

@@ -41,7 +41,7 @@ auto rows_of(Accuracy& accuracy) {
 }
 
 // NaN and infinity have no JSON; they become null.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 std::string percent(double share) { return std::isnan(share) ? "-" : fmt::format("{:.1f} %", 100 * share); }
 std::string metres(double value) { return std::isnan(value) ? "-" : fmt::format("{:.3f}", value); }
@@ -104,9 +104,9 @@ std::string to_csv(const DepthAccuracy& accuracy) {
 std::string to_json(const DepthAccuracy& accuracy) {
   Json ranges = Json::array();
   for (const RangeAccuracy* row : rows_of(accuracy)) {
-    Json range = {{"range", range_name(*row)}, {"from_m", row->from}, {"to_m", number(row->to)}};
+    Json range = {{"range", range_name(*row)}, {"from_m", row->from}, {"to_m", finite_or_null(row->to)}};
     for (const auto& [name, field] : kCounts) range[name] = row->*field;
-    for (const auto& [name, field] : kFigures) range[name] = number(row->*field);
+    for (const auto& [name, field] : kFigures) range[name] = finite_or_null(row->*field);
     ranges.push_back(std::move(range));
   }
   const Json json = {
