@@ -12,7 +12,7 @@ std::string file_of_a_wall() {
   auto map = pade::mapping::OccupancyMap::create(options);
   const pade::Camera camera{.width = 80, .height = 60, .fx = 60, .fy = 60, .cx = 39.5, .cy = 29.5};
   pade::DepthImage wall;
-  wall.depth = cv::Mat(camera.size(), CV_32F, cv::Scalar(4));  // Z, m; without a variance: exact
+  wall.depth = cv::Mat(camera.size(), CV_32F, cv::Scalar(4.05));  // Z, m; without a variance: exact
   map->integrate(wall, camera, pade::Pose{});
   const std::string file = "wall.bt";
   const auto written = pade::io::write_map(*map, file, pade::io::Overwrite::replace);
