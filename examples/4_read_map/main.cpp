@@ -10,7 +10,7 @@ std::string file_of_a_wall() {
   pade::mapping::MapOptions options;
   options.looks_baseline = 0;  // one look is enough
   auto map = pade::mapping::OccupancyMap::create(options);
-  const pade::Camera camera{.width = 80, .height = 60, .fx = 60, .fy = 60, .cx = 39.5, .cy = 29.5};
+  const pade::Camera camera{.width = 160, .height = 120, .fx = 120, .fy = 120, .cx = 79.5, .cy = 59.5};
   pade::DepthImage wall;
   wall.depth = cv::Mat(camera.size(), CV_32F, cv::Scalar(4.05));  // Z, m; without a variance: exact
   map->integrate(wall, camera, pade::Pose{});
