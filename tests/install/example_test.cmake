@@ -6,9 +6,9 @@ run(${CMAKE_COMMAND} --build ${WORK}/examples)
 run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK}/examples --output-on-failure)
 message("${output}")
 
-# Navigation needs Eigen and nothing else.
+# Navigation needs Eigen and fmt, and nothing else.
 set(none "")
-foreach(package PadeOpenCV OpenCV octomap GeographicLib yaml-cpp nlohmann_json fmt Threads)
+foreach(package PadeOpenCV OpenCV octomap GeographicLib yaml-cpp nlohmann_json Threads)
   list(APPEND none -D CMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
 endforeach()
 run(${CMAKE_COMMAND} -S ${SOURCE}/examples/3_navigation -B ${WORK}/navigation ${user_options} ${none})
