@@ -326,6 +326,7 @@ TEST(MapOptions, ThatMakeNoSenseAreRefusedByName) {
       {"occupancy_threshold", [](MapOptions& o) { o.occupancy_threshold = 0.05; }},
       {"free_margin_sigmas", [](MapOptions& o) { o.free_margin_sigmas = -1; }},
       {"free_hole", [](MapOptions& o) { o.free_hole = -0.1; }},
+      {"free_hole", [](MapOptions& o) { o.free_hole = std::numeric_limits<double>::infinity(); }},
       {"looks_baseline", [](MapOptions& o) { o.looks_baseline = std::nan(""); }},
       {"hit_max_relative_sigma", [](MapOptions& o) { o.hit_max_relative_sigma = 0.6; }},
       {"hit_near", [](MapOptions& o) { o.hit_near = -1; }},

@@ -162,7 +162,8 @@ void Clearance::close_holes(const cv::Mat& depth) {
   const int width = depth.cols;
   const int height = depth.rows;
   const double reach = parameters_.hole * std::min(camera_.fx, camera_.fy);
-  for (double size = reach / kNearest; size >= 1; size /= kStep) {
+  const double largest_spot = std::max(width, height);
+  for (double size = std::min(reach / kNearest, largest_spot); size >= 1; size /= kStep) {
     const auto end = static_cast<float>(std::min(reach / std::floor(size), parameters_.range));
     find_runs(end, width, height);
     find_holes(depth, end);

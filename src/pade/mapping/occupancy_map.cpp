@@ -117,7 +117,7 @@ Status check(const MapOptions& o) {
   }
   if (!(o.free_margin_sigmas >= 0))
     return out_of_range("free_margin_sigmas", o.free_margin_sigmas, "at least 0");
-  if (!(o.free_hole >= 0)) return out_of_range("free_hole", o.free_hole, "at least 0");
+  if (!(o.free_hole >= 0 && o.free_hole <= 1000)) return out_of_range("free_hole", o.free_hole, "0 to 1000");
   if (!(o.looks_baseline >= 0)) return out_of_range("looks_baseline", o.looks_baseline, "at least 0");
   if (!(o.hit_max_relative_sigma >= 0 && o.hit_max_relative_sigma <= 0.5)) {
     return out_of_range("hit_max_relative_sigma", o.hit_max_relative_sigma, "0 to 0.5");
