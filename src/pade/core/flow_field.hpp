@@ -15,4 +15,17 @@ struct FlowField {
   [[nodiscard]] bool empty() const { return vectors.empty(); }
 };
 
+/// How far the pixels of a reference image have moved in several other views, with one unknown per pixel that
+/// all views share: the distance d from the point at infinity, inverse depth times a constant. All CV_32FC1.
+struct ParallaxField {
+  cv::Mat distance;     ///< d, dense
+  cv::Mat information;  ///< sum over the matching views of 1 / sigma^2 of d; 0 = no view says anything
+  cv::Mat step;         ///< mean of the further steps in d that the views still ask for
+  cv::Mat spread;       ///< chi-square, of matching - 1, of these steps about their mean
+  cv::Mat matching;     ///< number of views whose match is right, as far as the images tell
+  cv::Mat wrong;        ///< number of views in which it is not
+
+  [[nodiscard]] bool empty() const { return distance.empty(); }
+};
+
 }  // namespace pade

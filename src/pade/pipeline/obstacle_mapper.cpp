@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -107,7 +108,18 @@ Status check(const ObstacleMapperOptions& o) {
   if (Status status = within("refinement", check(o.refinement)); !status) return status;
   if (Status status = within("depth", check(o.depth)); !status) return status;
   if (Status status = within("edges", check(o.edges)); !status) return status;
+  if (Status status = within("views", check(o.views)); !status) return status;
   return within("map", check(o.map));
+}
+
+Status check(const ViewsOptions& o) {
+  const OptionRange ranges[] = {
+      {"count", static_cast<double>(o.count), 0, 16},
+      {"frames", static_cast<double>(o.frames), 1, 1000},
+  };
+  if (Status status = check_ranges(ranges); !status) return status;
+  if (Status status = within("flow", check(o.flow)); !status) return status;
+  return within("depth", check(o.depth));
 }
 
 ObstacleMapperOptions one_pair(ObstacleMapperOptions options) {
@@ -115,6 +127,7 @@ ObstacleMapperOptions one_pair(ObstacleMapperOptions options) {
   options.prior_level = -1;
   options.refinement.on = false;
   options.edges.radius = 0;
+  options.views.count = 0;
   options.depth.flow_sigma_scale = 1;
   options.depth.flow_relative_sigma = 0;
   return options;
@@ -159,6 +172,7 @@ ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions
       guide_(std::move(guide)),
       refiner_(options.refinement),
       depth_(options.depth),
+      views_(options.views.flow),
       map_(std::move(map)) {
   if (!valid_.empty() && cv::countNonZero(valid_ == 0) == 0) valid_.release();
   flow_->set_mask(valid_);
@@ -205,7 +219,8 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     ++health_.mapped;
   }
   recent_.push_back(std::move(newest));
-  const int kept = two_baselines() ? options_.longest_step : options_.step;
+  int kept = two_baselines() ? options_.longest_step : options_.step;
+  if (many_views()) kept = std::max(kept, options_.views.frames);
   if (recent_.size() > static_cast<std::size_t>(kept)) recent_.pop_front();
   return update_;
 }
@@ -214,6 +229,11 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
 bool ObstacleMapper::two_baselines() const {
   return options_.longest_step > options_.step && options_.order == Order::newest &&
          options_.derotation == depth::Derotation::image;
+}
+
+bool ObstacleMapper::many_views() const {
+  return options_.views.count > 0 && two_baselines() && options_.depth.window == 1 &&
+         options_.depth.gates == depth::Gates::on;
 }
 
 const ObstacleMapper::Tracked& ObstacleMapper::before(int frames) const {
@@ -263,6 +283,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
     depth::fuse_pairs(first_depth_, update_.depth);
     update_.step = step;
   }
+  if (many_views()) see_from_many(newest.frame, pair);
   if (options_.depth.gates == depth::Gates::on) {
     const Stopwatch watch(update_, Stage::depth);
     depth::guard_edges(update_.depth, options_.edges);
@@ -349,6 +370,53 @@ int ObstacleMapper::longer_step(const Frame& newest, const Pair& first) const {
     if (*most * longer <= options_.largest_parallax * baseline) return step;
   }
   return options_.step;
+}
+
+/// Views whose baselines double, from the longest one on.
+std::vector<const Frame*> ObstacleMapper::choose_views(const Frame& newest) const {
+  std::vector<const Frame*> views;
+  const auto baseline = [&](const Frame& frame) {
+    return (frame.T_world_camera.translation - newest.T_world_camera.translation).norm();
+  };
+  const int available = std::min(options_.views.frames, static_cast<int>(recent_.size()));
+  double wanted = std::numeric_limits<double>::infinity();
+  for (int i = available; i >= 1 && std::ssize(views) < options_.views.count; --i) {
+    const Frame& frame = before(i).frame;
+    const double length = baseline(frame);
+    if (length > wanted || !(length > 0)) continue;
+    views.push_back(&frame);
+    wanted = length / 2 * (1 + 1e-6);
+  }
+  std::reverse(views.begin(), views.end());
+  return views;
+}
+
+/// Several views at once, from where the pair has ended.
+void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
+  const Stopwatch watch(update_, Stage::depth);
+  const std::vector<const Frame*> frames = choose_views(newest);
+  if (frames.empty()) {
+    found_ = {};
+    return;
+  }
+  const double baseline =
+      (frames.back()->T_world_camera.translation - newest.T_world_camera.translation).norm();
+  const double scale = camera_.fx * baseline;
+  const cv::Matx33d K(camera_.fx, 0, camera_.cx, 0, camera_.fy, camera_.cy, 0, 0, 1);
+  std::vector<flow::View> views;
+  for (const Frame* frame : frames) {
+    const Pose T_view_newest = frame->T_world_camera.inverse() * newest.T_world_camera;
+    const Eigen::Matrix3d R = T_view_newest.matrix3();
+    const Eigen::Vector3d& t = T_view_newest.translation;
+    const cv::Matx33d rotation(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2));
+    views.push_back({frame->image, cv::Matx33f(K * rotation * K.inv()),
+                     cv::Vec3f(K * cv::Vec3d(t.x(), t.y(), t.z()) * (1 / scale))});
+  }
+  cv::Mat start = depth::start_of_views(update_.depth, pair.flow.vectors, camera_, pair.motion,
+                                        newest.T_world_camera, found_, baseline, options_.views.depth);
+  const ParallaxField field = views_.estimate(newest.image, views, start * scale);
+  depth::read_views(field, scale, options_.depth, options_.views.depth, update_.depth);
+  found_ = {newest.T_world_camera, field.distance * (1 / scale)};
 }
 
 void ObstacleMapper::estimate_depth(const Pair& pair, const Frame& reference,

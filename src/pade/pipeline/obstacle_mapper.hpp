@@ -23,6 +23,8 @@
 #include "pade/depth/depth_options.hpp"
 #include "pade/depth/edges.hpp"
 #include "pade/depth/motion_refinement.hpp"
+#include "pade/depth/multi_view/views_depth.hpp"
+#include "pade/flow/epipolar/multi_view.hpp"
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 
@@ -33,6 +35,23 @@ enum class Order {
   newest,  ///< flow toward the older frame; depth belongs to the frame that has just come: zero latency
   first,   ///< the paper's order: depth belongs to the older frame
 };
+
+/// Depth from more frames than the pair.
+struct ViewsOptions {
+  int count = 4;
+  int frames = 16;
+  flow::MultiViewOptions flow;
+  depth::ViewsDepthOptions depth;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("count", self.count, "views that a frame is compared with at once; 0 = only the pair (two-view)");
+    field("frames", self.frames, "the oldest of them is at most this many frames old");
+    field("flow", self.flow, "their common parallax");
+    field("depth", self.depth, "depth from it");
+  }
+};
+Status check(const ViewsOptions& options);
 
 struct ObstacleMapperOptions {
   std::string flow = "clg-fast-half";
@@ -45,6 +64,7 @@ struct ObstacleMapperOptions {
   depth::MotionRefinementOptions refinement;
   depth::DepthOptions depth = depth::chain_options();
   depth::EdgeOptions edges;
+  ViewsOptions views;
   mapping::MapOptions map;
 
   template <class Self, class Visitor>
@@ -63,6 +83,7 @@ struct ObstacleMapperOptions {
     field("refinement", self.refinement, "motion refined by the images");
     field("edges", self.edges, "depth at edges");
     field("depth", self.depth, "depth from motion");
+    field("views", self.views, "depth from several views");
     field("map", self.map, "occupancy map");
   }
 };
@@ -157,6 +178,7 @@ class ObstacleMapper {
                  mapping::OccupancyMap map);
   [[nodiscard]] std::string reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const;
   [[nodiscard]] bool two_baselines() const;
+  [[nodiscard]] bool many_views() const;
   [[nodiscard]] const Tracked& before(int frames) const;
   void map_frame(Tracked& newest);
   [[nodiscard]] cv::Mat foretold_flow(const RelativeMotion& motion) const;
@@ -165,6 +187,8 @@ class ObstacleMapper {
   void refine(Pair& pair, const Frame& reference);
   void place(Tracked& newest, const Tracked& older) const;
   [[nodiscard]] int longer_step(const Frame& newest, const Pair& first) const;
+  void see_from_many(const Frame& newest, const Pair& pair);
+  [[nodiscard]] std::vector<const Frame*> choose_views(const Frame& newest) const;
   void estimate_depth(const Pair& pair, const Frame& reference, const std::optional<Eigen::Matrix3d>& removed,
                       DepthImage& out);
 
@@ -175,6 +199,8 @@ class ObstacleMapper {
   std::unique_ptr<flow::FlowEstimator> guide_;  // of the first of two: refines the motion, starts the other
   depth::MotionRefiner refiner_;
   depth::DepthEstimator depth_;
+  flow::MultiViewEstimator views_;
+  depth::InverseDepthImage found_;  // of the last frame, by several views
   mapping::OccupancyMap map_;
   std::deque<Tracked> recent_;  // grey, oldest first
   DepthImage first_depth_;      // of the shorter baseline
