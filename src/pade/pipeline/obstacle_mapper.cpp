@@ -408,7 +408,8 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
     const Pose T_view_newest = frame->T_world_camera.inverse() * newest.T_world_camera;
     const Eigen::Matrix3d R = T_view_newest.matrix3();
     const Eigen::Vector3d& t = T_view_newest.translation;
-    const cv::Matx33d rotation(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2));
+    const cv::Matx33d rotation(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1),
+                               R(2, 2));
     views.push_back({frame->image, cv::Matx33f(K * rotation * K.inv()),
                      cv::Vec3f(K * cv::Vec3d(t.x(), t.y(), t.z()) * (1 / scale))});
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include <opencv2/imgproc.hpp>
+
 #include "pade/core/option_check.hpp"
 
 namespace pade::depth {
@@ -11,13 +13,14 @@ namespace {
 
 constexpr float kEpipoleRadius = 5;  // px: nearer to the epipole the parallax of a pair says little
 constexpr float kNearest = 0.05F;    // m
+constexpr int kBoundRadius = 2;      // px
 
 constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
 
 /// Bilinear; NaN outside.
 float at(const cv::Mat& values, float x, float y) {
-  const bool inside = x >= 0 && y >= 0 && x < static_cast<float>(values.cols - 1) &&
-                      y < static_cast<float>(values.rows - 1);
+  const bool inside =
+      x >= 0 && y >= 0 && x < static_cast<float>(values.cols - 1) && y < static_cast<float>(values.rows - 1);
   if (!inside) return std::numeric_limits<float>::quiet_NaN();
   const int ix = static_cast<int>(x);
   const int iy = static_cast<int>(y);
@@ -46,8 +49,7 @@ class Lookup {
   /// Inverse depth, here, of what the last frame saw where a point of inverse depth `rho` on the ray of (x,
   /// y) was; NaN = it did not see it.
   [[nodiscard]] float operator()(float x, float y, float rho) const {
-    const Eigen::Vector3f ray =
-        R_ * Eigen::Vector3f((x - cx_) / fx_, (y - cy_) / fy_, 1);
+    const Eigen::Vector3f ray = R_ * Eigen::Vector3f((x - cx_) / fx_, (y - cy_) / fy_, 1);
     const Eigen::Vector3f q = ray + rho * t_;
     const float nan = std::numeric_limits<float>::quiet_NaN();
     if (!(q.z() > 0)) return nan;
@@ -112,52 +114,105 @@ cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Ca
   return start;
 }
 
+namespace {
+
+/// Rows of the planes of a depth image.
+struct Row {
+  Row(DepthImage& image, int v)
+      : depth(image.depth.ptr<float>(v)),
+        variance(image.variance.ptr<float>(v)),
+        own_variance(image.own_variance.ptr<float>(v)),
+        bound(image.bound.ptr<float>(v)),
+        state(image.state.ptr<std::uint8_t>(v)) {}
+  float* depth;
+  float* variance;
+  float* own_variance;
+  float* bound;
+  std::uint8_t* state;
+};
+
+/// What is decided per pixel.
+class Reader {
+ public:
+  Reader(double scale, const DepthOptions& depth, const ViewsDepthOptions& options)
+      : scale_(static_cast<float>(scale)),
+        range_(static_cast<float>(depth.range)),
+        k_(static_cast<float>(depth.bound_sigmas)),
+        gate2_(static_cast<float>(depth.parallax_gate * depth.parallax_gate)),
+        sigma_scale2_(static_cast<float>(options.sigma_scale * options.sigma_scale)),
+        relative2_(static_cast<float>(options.relative_sigma * options.relative_sigma)) {}
+
+  /// sigma^2 of d: the views' own, more where they contradict each other, and a share of d.
+  [[nodiscard]] float variance(float d, float information, float matching, float spread) const {
+    const float contradiction = matching > 1 ? std::max(1.0F, spread / (matching - 1)) : 1.0F;
+    return sigma_scale2_ * contradiction / information + relative2_ * d * d;
+  }
+  /// Z before which there is nothing.
+  [[nodiscard]] float bound(float d, float sigma2) const {
+    return scale_ / (std::max(d, 0.0F) + k_ * std::sqrt(sigma2));
+  }
+  /// Depth, variance and state in place of what pixel u has.
+  void place(const Row& row, int u, float d, float sigma2) const {
+    const float z = scale_ / d;
+    const float e2 = sigma2 / (d * d);
+    const bool was_measured = row.state[u] == code(DepthState::measured);
+    if (d > 0 && e2 * gate2_ < 1 && z <= range_) {
+      const float common = was_measured ? row.variance[u] - row.own_variance[u] : 0.0F;
+      const float farther = common > 0 ? z / row.depth[u] : 0.0F;  // common errors are those of 1/Z
+      row.depth[u] = z;
+      row.own_variance[u] = z * z * e2 * (1 + e2 * (18 + 400 * e2));
+      row.variance[u] = row.own_variance[u] + common * farther * farther * farther * farther;
+      row.state[u] = code(DepthState::measured);
+      return;
+    }
+    if (was_measured) {
+      row.depth[u] = row.variance[u] = row.own_variance[u] = std::numeric_limits<float>::quiet_NaN();
+      row.state[u] = code(DepthState::low_parallax);
+    }
+    const bool low = row.state[u] == code(DepthState::low_parallax);
+    if (low && row.bound[u] >= range_) row.state[u] = code(DepthState::far);
+  }
+
+ private:
+  float scale_, range_, k_, gate2_, sigma_scale2_, relative2_;
+};
+
+/// States of a pair in which several views are not asked.
+bool is_blind(std::uint8_t state) {
+  return state == code(DepthState::inconsistent) || state == code(DepthState::out_of_view) ||
+         state == code(DepthState::no_texture);
+}
+
+/// What a window has matched may be that of a pixel beside: no bound is beyond those around it.
+void shorten_bounds(const cv::Mat& of_views, cv::Mat& bound) {
+  constexpr int kSide = 2 * kBoundRadius + 1;
+  cv::Mat least;
+  cv::erode(of_views, least, cv::getStructuringElement(cv::MORPH_RECT, {kSide, kSide}));
+  least.copyTo(bound, bound > least);
+}
+
+}  // namespace
+
 void read_views(const ParallaxField& field, double scale, const DepthOptions& depth,
                 const ViewsDepthOptions& options, DepthImage& image) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  const auto s = static_cast<float>(scale);
-  const auto range = static_cast<float>(depth.range);
-  const auto k = static_cast<float>(depth.bound_sigmas);
-  const auto gate2 = static_cast<float>(depth.parallax_gate * depth.parallax_gate);
-  const auto sigma_scale2 = static_cast<float>(options.sigma_scale * options.sigma_scale);
-  const auto relative2 = static_cast<float>(options.relative_sigma * options.relative_sigma);
+  const Reader reader(scale, depth, options);
+  cv::Mat bounds(image.depth.size(), CV_32FC1, cv::Scalar(std::numeric_limits<float>::infinity()));
   for (int v = 0; v < image.depth.rows; ++v) {
-    const auto* d_row = field.distance.ptr<float>(v);
+    const Row row(image, v);
+    const auto* d = field.distance.ptr<float>(v);
     const auto* information = field.information.ptr<float>(v);
     const auto* spread = field.spread.ptr<float>(v);
     const auto* matching = field.matching.ptr<float>(v);
-    auto* z_row = image.depth.ptr<float>(v);
-    auto* variance = image.variance.ptr<float>(v);
-    auto* own = image.own_variance.ptr<float>(v);
-    auto* bound = image.bound.ptr<float>(v);
-    auto* state = image.state.ptr<std::uint8_t>(v);
+    auto* bound = bounds.ptr<float>(v);
     for (int u = 0; u < image.depth.cols; ++u) {
-      const bool blind = state[u] == code(DepthState::inconsistent) ||
-                         state[u] == code(DepthState::out_of_view) ||
-                         state[u] == code(DepthState::no_texture);
-      if (blind || !(information[u] > 0)) continue;
-      const float d = d_row[u];
-      const float contradiction = matching[u] > 1 ? std::max(1.0F, spread[u] / (matching[u] - 1)) : 1.0F;
-      const float sigma2 = sigma_scale2 * contradiction / information[u] + relative2 * d * d;
-      const float nothing_before = s / (std::max(d, 0.0F) + k * std::sqrt(sigma2));
-      if (!(bound[u] >= nothing_before)) bound[u] = nothing_before;
-      const float z = s / d;
-      const float e2 = sigma2 / (d * d);
-      const float common = state[u] == code(DepthState::measured) ? variance[u] - own[u] : 0.0F;
-      if (d > 0 && e2 * gate2 < 1 && z <= range) {
-        const float common_here = common > 0 ? common * std::pow(z / z_row[u], 4.0F) : 0.0F;
-        z_row[u] = z;
-        own[u] = z * z * e2 * (1 + e2 * (18 + 400 * e2));
-        variance[u] = own[u] + common_here;
-        state[u] = code(DepthState::measured);
-      } else if (state[u] == code(DepthState::measured)) {
-        z_row[u] = variance[u] = own[u] = nan;
-        state[u] = code(bound[u] >= range ? DepthState::far : DepthState::low_parallax);
-      } else if (state[u] == code(DepthState::low_parallax) && bound[u] >= range) {
-        state[u] = code(DepthState::far);
-      }
+      if (is_blind(row.state[u]) || !(information[u] > 0)) continue;
+      const float sigma2 = reader.variance(d[u], information[u], matching[u], spread[u]);
+      bound[u] = reader.bound(d[u], sigma2);
+      if (!(row.bound[u] >= bound[u])) row.bound[u] = bound[u];
+      reader.place(row, u, d[u], sigma2);
     }
   }
+  shorten_bounds(bounds, image.bound);
 }
 
 }  // namespace pade::depth

@@ -21,7 +21,8 @@ struct ViewsDepthOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("sigma_scale", self.sigma_scale, "what the standard deviations of the views are multiplied by");
-    field("relative_sigma", self.relative_sigma, "further standard deviation of inverse depth, as share of it");
+    field("relative_sigma", self.relative_sigma,
+          "further standard deviation of inverse depth, as share of it");
     field("agreement", self.agreement,
           "depths of the last frame are a start where they agree with the new ones within this share");
   }
@@ -38,7 +39,7 @@ struct InverseDepthImage {
 /// Where the search of several views starts: the depth of a pair of frames, published or as its flow has it,
 /// and in its place what the last frame has found, where the two agree (within `agreement`, or 3 px over a
 /// baseline of `baseline` metres): then the search goes on where it has ended.
-/// @param two_view  depth image of the pair, window 1. @param flow  its derotated flow, px. @param motion  its
+/// @param two_view  depth image of the pair, window 1. @param flow  its derotated flow, px. @param motion its
 /// motion. @param T_world_camera  of its reference. @return CV_32FC1, 1/m, finite.
 cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Camera& camera,
                        const RelativeMotion& motion, const Pose& T_world_camera,

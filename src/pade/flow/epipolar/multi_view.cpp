@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <opencv2/imgproc.hpp>
+
 #include "pade/core/compute/simd.hpp"
 #include "pade/core/option_check.hpp"
 #include "pade/flow/kernels/epipolar_kernels.hpp"
@@ -20,6 +22,28 @@ constexpr int kWindowRadius = 5;
 constexpr double kTensorSigma = 0.4;
 constexpr int kTensorRadius = 1;
 constexpr float kGreyNoise = 1;
+constexpr int kCostWindow = 3;
+constexpr float kClearly = 0.25F;  // grey values
+constexpr float kUnseen = 1e3F;    // cost where no view sees a pixel
+
+ViewGeometry geometry(const View& view, const MultiViewOptions& options) {
+  ViewGeometry g;
+  for (int i = 0; i < 9; ++i) g.H[i] = view.H.val[i];
+  for (int i = 0; i < 3; ++i) g.e[i] = view.e[i];
+  g.largest_parallax2 = static_cast<float>(options.largest_parallax * options.largest_parallax);
+  g.largest_scale = static_cast<float>(options.largest_scale);
+  return g;
+}
+
+/// The plane as a matrix that shares its memory.
+cv::Mat header(const Plane& plane) {
+  return {plane.height(), plane.width(), CV_32FC1, plane.data(),
+          static_cast<std::size_t>(plane.stride()) * sizeof(float)};
+}
+
+void copy(const cv::Mat& values, const Plane& plane) {
+  for (int y = 0; y < values.rows; ++y) std::copy_n(values.ptr<float>(y), values.cols, plane.row(y));
+}
 
 cv::Mat to_mat(const Plane& plane) {
   cv::Mat values(plane.height(), plane.width(), CV_32FC1);
@@ -31,6 +55,8 @@ cv::Mat to_mat(const Plane& plane) {
 
 Status check(const MultiViewOptions& o) {
   const OptionRange ranges[] = {
+      {"reach", static_cast<double>(o.reach), 0, 64},
+      {"switching", o.switching, 0, 1},
       {"warps", static_cast<double>(o.warps), 0, 100},
       {"sweeps", static_cast<double>(o.sweeps), 0, 1000},
       {"omega", o.omega, above_zero, 1.999},
@@ -58,18 +84,18 @@ struct MultiViewEstimator::Buffers {
   std::vector<float> window = gaussian_taps(kWindowSigma, kWindowRadius);
 
   void resize(int width, int height) {
-    for (Plane* plane : {&base_u, &base_v, &direction_x, &direction_y, &mean, &difference, &distance0,
-                         &distance, &spare, &j11, &j13, &j33, &sum11, &sum13, &information, &step, &step2,
-                         &matching, &wrong}) {
+    for (Plane* plane :
+         {&base_u, &base_v, &direction_x, &direction_y, &mean, &difference, &distance0, &distance, &spare,
+          &j11, &j13, &j33, &sum11, &sum13, &information, &step, &step2, &matching, &wrong}) {
       plane->resize(width, height);
     }
     for (SplitPlane* plane : {&split_distance, &inverse, &right_hand_side, &right, &below}) {
       plane->resize(width, height);
     }
     const long planes = kPlaneLines * (padded(width) + 2L * kRowMultiple);
-    scratch.resize(static_cast<std::size_t>(
-        std::max({planes, PADE_DISPATCH(clg_scratch, isa)(kTensorRadius, width),
-                  PADE_DISPATCH(evidence_scratch, isa)(kWindowRadius, width)})));
+    scratch.resize(
+        static_cast<std::size_t>(std::max({planes, PADE_DISPATCH(clg_scratch, isa)(kTensorRadius, width),
+                                           PADE_DISPATCH(evidence_scratch, isa)(kWindowRadius, width)})));
   }
   [[nodiscard]] EpipolarLevel line() const {
     return {base_u.view(), base_v.view(), direction_x.view(), direction_y.view()};
@@ -82,10 +108,57 @@ MultiViewEstimator::MultiViewEstimator(MultiViewEstimator&&) noexcept = default;
 MultiViewEstimator& MultiViewEstimator::operator=(MultiViewEstimator&&) noexcept = default;
 MultiViewEstimator::~MultiViewEstimator() = default;
 
+/// Mean truncated residual over the views that see a pixel, in a small window.
+cv::Mat MultiViewEstimator::cost(const std::vector<View>& views, const Plane& distance) {
+  Buffers& b = *buffers_;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    PADE_DISPATCH(view_cost, b.isa)
+    (geometry(views[i], options_), b.first.levels[0].view(), b.views[i].levels[0].view(), distance.view(),
+     b.sum11.view(), b.sum13.view(), i == 0, 0, distance.height());
+  }
+  const cv::Mat count = header(b.sum13);
+  cv::Mat mean = header(b.sum11) / cv::max(count, 1);
+  mean.setTo(kUnseen, count < 0.5);
+  cv::boxFilter(mean, mean, -1, {kCostWindow, kCostWindow});
+  return mean;
+}
+
+/// Beside an edge a pixel has the depth of the wrong side, and gradients do not lead to the other one. It
+/// takes the nearest or the farthest depth around where the views like that clearly better.
+void MultiViewEstimator::compete(const std::vector<View>& views) {
+  Buffers& b = *buffers_;
+  const int side = 2 * options_.reach + 1;
+  const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {side, side});
+  const cv::Mat own = header(b.distance);
+  const cv::Mat own_cost = cost(views, b.distance);
+  cv::Mat others[2];
+  cv::Mat costs[2];
+  cv::dilate(own, others[0], square);
+  cv::erode(own, others[1], square);
+  for (int i = 0; i < 2; ++i) {
+    copy(others[i], b.spare);
+    costs[i] = cost(views, b.spare);
+  }
+  const auto share = static_cast<float>(options_.switching);
+  for (int y = 0; y < own.rows; ++y) {
+    const auto* c0 = own_cost.ptr<float>(y);
+    const auto* c1 = costs[0].ptr<float>(y);
+    const auto* c2 = costs[1].ptr<float>(y);
+    const auto* nearest = others[0].ptr<float>(y);
+    const auto* farthest = others[1].ptr<float>(y);
+    float* d = b.distance.row(y);
+    for (int x = 0; x < own.cols; ++x) {
+      const float limit = share * c0[x] - kClearly;
+      const float best = std::min(c1[x], c2[x]);
+      if (best < limit) d[x] = c1[x] <= c2[x] ? nearest[x] : farthest[x];
+    }
+  }
+}
+
 ParallaxField MultiViewEstimator::estimate(const cv::Mat& reference, const std::vector<View>& views,
                                            const cv::Mat& initial) {
-  if (reference.type() != CV_8UC1 || reference.empty() || views.empty() ||
-      initial.type() != CV_32FC1 || initial.size() != reference.size()) {
+  if (reference.type() != CV_8UC1 || reference.empty() || views.empty() || initial.type() != CV_32FC1 ||
+      initial.size() != reference.size()) {
     return {};
   }
   for (const View& view : views) {
@@ -105,14 +178,7 @@ ParallaxField MultiViewEstimator::estimate(const cv::Mat& reference, const std::
     for (int x = width; x < padded(width); ++x) to[x] = to[width - 1];
   }
 
-  const auto geometry = [&](const View& view) {
-    ViewGeometry g;
-    for (int i = 0; i < 9; ++i) g.H[i] = view.H.val[i];
-    for (int i = 0; i < 3; ++i) g.e[i] = view.e[i];
-    g.largest_parallax2 = static_cast<float>(options_.largest_parallax * options_.largest_parallax);
-    g.largest_scale = static_cast<float>(options_.largest_scale);
-    return g;
-  };
+  if (options_.reach > 0) compete(views);
 
   EpipolarClg level;
   level.line = b.line();
@@ -139,7 +205,8 @@ ParallaxField MultiViewEstimator::estimate(const cv::Mat& reference, const std::
       level.j11 = b.j11.view();
       level.j13 = b.j13.view();
       level.j33 = b.j33.view();
-      PADE_DISPATCH(view_lines, b.isa)(geometry(views[i]), b.distance.view(), level.line, 0, height);
+      PADE_DISPATCH(view_lines, b.isa)
+      (geometry(views[i], options_), b.distance.view(), level.line, 0, height);
       PADE_DISPATCH(epipolar_clg_warp, b.isa)(level, 0, height);
       PADE_DISPATCH(epipolar_clg_tensor, b.isa)(level, 0, height, b.scratch.data());
       tensor.j11 = b.j11.view();
@@ -176,7 +243,8 @@ ParallaxField MultiViewEstimator::estimate(const cv::Mat& reference, const std::
   evidence.effective_size = static_cast<float>(effective_window(b.window));
   for (std::size_t i = 0; i < views.size(); ++i) {
     evidence.second = b.views[i].levels[0].view();
-    PADE_DISPATCH(view_lines, b.isa)(geometry(views[i]), b.distance.view(), evidence.line, 0, height);
+    PADE_DISPATCH(view_lines, b.isa)
+    (geometry(views[i], options_), b.distance.view(), evidence.line, 0, height);
     PADE_DISPATCH(view_evidence, b.isa)(evidence, i == 0, 0, height, b.scratch.data());
   }
   ParallaxField out{to_mat(b.distance), to_mat(b.information), to_mat(b.step),

@@ -13,6 +13,8 @@
 
 namespace pade::flow {
 
+class Plane;
+
 /// Another view. The point of pixel p (homogeneous, p~ = (x, y, 1)) at the distance d from infinity is seen
 /// at H p~ + d e, homogeneous. With K (R p_ray + t / Z): H = K R K^-1, e = K t per unit of d. Whoever knows
 /// the poses computes them; this room does not.
@@ -23,10 +25,12 @@ struct View {
 };
 
 struct MultiViewOptions {
+  int reach = 5;
+  double switching = 0.9;
   int warps = 2;
   int sweeps = 8;
   double omega = 1.9;
-  double alpha = 8;
+  double alpha = 2;
   double gamma = 30;
   double data_epsilon = 1;
   double smooth_epsilon = 0.02;
@@ -36,6 +40,11 @@ struct MultiViewOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
+    field(
+        "reach", self.reach,
+        "a pixel may take the depth of the nearest or farthest one within this many pixels, where the views "
+        "like it better: at edges; 0 = never");
+    field("switching", self.switching, "where its residual is below this share of its own");
     field("warps", self.warps, "linearisations about the present solution");
     field("sweeps", self.sweeps, "red-black sweeps per warp");
     field("omega", self.omega, "over-relaxation factor");
@@ -69,6 +78,8 @@ class MultiViewEstimator {
 
  private:
   struct Buffers;
+  [[nodiscard]] cv::Mat cost(const std::vector<View>& views, const Plane& distance);
+  void compete(const std::vector<View>& views);
   MultiViewOptions options_;
   std::unique_ptr<Buffers> buffers_;
 };

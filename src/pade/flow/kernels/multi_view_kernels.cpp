@@ -17,14 +17,15 @@ namespace {
 constexpr float kWrong = 0.1F;
 constexpr float kSlack = 0.5F;
 constexpr float kNoiseGradients = 2.0F;
+constexpr float kTruncated = 20;  // grey values: farther off is as wrong
 constexpr int kChannels = 6;
 constexpr int kMatchedRows = 3;
 
 long matched_line(int width) { return padded(width) + 2L * kRowMultiple; }
 
 struct Seen {
-  V x, y;       // where the view sees the pixels
-  I inside;     // of its image, and used
+  V x, y;    // where the view sees the pixels
+  I inside;  // of its image, and used
 
   [[gnu::always_inline]] Seen(const ViewEvidence& e, int from_x, int from_y) {
     const V ex = load(e.line.direction_x.row(from_y) + from_x);
@@ -73,38 +74,77 @@ class Residual {
 
 PADE_INLINE void add(float* to, V value, bool reset) { store(to, reset ? value : load(to) + value); }
 
+// Where a view sees points.
+struct Point {
+  V x, y, per_z;
+  I used;
+};
+
+// One row of the reference.
+struct Row {
+  ViewGeometry g;
+  float v, rx, ry, rz, least_z;
+
+  [[gnu::always_inline]] Row(const ViewGeometry& view, int y)
+      : g(view),
+        v(static_cast<float>(y)),
+        rx(g.H[1] * v + g.H[2]),
+        ry(g.H[4] * v + g.H[5]),
+        rz(g.H[7] * v + g.H[8]),
+        least_z(1 / g.largest_scale) {}
+
+  [[gnu::always_inline]] Point at(V u, V d) const {
+    const V hx = g.H[0] * u + rx;
+    const V hy = g.H[3] * u + ry;
+    const V hz = g.H[6] * u + rz;
+    const V z = hz + d * g.e[2];
+    Point p;
+    p.per_z = 1.0F / z;
+    p.x = (hx + d * g.e[0]) * p.per_z;
+    p.y = (hy + d * g.e[1]) * p.per_z;
+    const V per_hz = 1.0F / hz;
+    const V px = p.x - hx * per_hz;
+    const V py = p.y - hy * per_hz;
+    p.used = I(hz > 0.0F) & I(z > least_z * hz) & I(z < g.largest_scale * hz) &
+             I(px * px + py * py <= g.largest_parallax2);
+    return p;
+  }
+};
+
 }  // namespace
 
 void view_lines(const ViewGeometry& view, PlaneView distance, const EpipolarLevel& line, int first,
                 int last) {
-  const ViewGeometry g = view;
-  const float least_z = 1 / g.largest_scale;
   for (int y = first; y < last; ++y) {
-    const auto v = static_cast<float>(y);
-    const float rx = g.H[1] * v + g.H[2];
-    const float ry = g.H[4] * v + g.H[5];
-    const float rz = g.H[7] * v + g.H[8];
+    const Row row(view, y);
     for (int x = 0; x < padded(distance.width); x += kLanes) {
       const V u = ramp() + static_cast<float>(x);
       const V d = load(distance.row(y) + x);
-      const V hx = g.H[0] * u + rx;
-      const V hy = g.H[3] * u + ry;
-      const V hz = g.H[6] * u + rz;
-      const V z = hz + d * g.e[2];
-      const V per_z = 1.0F / z;
-      const V per_hz = 1.0F / hz;
-      const V at_x = (hx + d * g.e[0]) * per_z;
-      const V at_y = (hy + d * g.e[1]) * per_z;
-      const V dx = (g.e[0] - at_x * g.e[2]) * per_z;
-      const V dy = (g.e[1] - at_y * g.e[2]) * per_z;
-      const V px = at_x - hx * per_hz;
-      const V py = at_y - hy * per_hz;
-      const I used = I(hz > 0.0F) & I(z > least_z * hz) & I(z < g.largest_scale * hz) &
-                     I(px * px + py * py <= g.largest_parallax2);
-      store(line.direction_x.row(y) + x, select(used, dx, V{}));
-      store(line.direction_y.row(y) + x, select(used, dy, V{}));
-      store(line.base_u.row(y) + x, select(used, at_x - u - d * dx, V{}));
-      store(line.base_v.row(y) + x, select(used, at_y - v - d * dy, V{}));
+      const Point at = row.at(u, d);
+      const V dx = (row.g.e[0] - at.x * row.g.e[2]) * at.per_z;
+      const V dy = (row.g.e[1] - at.y * row.g.e[2]) * at.per_z;
+      store(line.direction_x.row(y) + x, select(at.used, dx, V{}));
+      store(line.direction_y.row(y) + x, select(at.used, dy, V{}));
+      store(line.base_u.row(y) + x, select(at.used, at.x - u - d * dx, V{}));
+      store(line.base_v.row(y) + x, select(at.used, at.y - row.v - d * dy, V{}));
+    }
+  }
+}
+
+void view_cost(const ViewGeometry& view, PlaneView reference, PlaneView seen, PlaneView distance,
+               PlaneView cost, PlaneView count, bool reset, int first, int last) {
+  const auto right = static_cast<float>(distance.width - 1);
+  const auto bottom = static_cast<float>(distance.height - 1);
+  for (int y = first; y < last; ++y) {
+    const Row row(view, y);
+    for (int x = 0; x < padded(distance.width); x += kLanes) {
+      const Point at = row.at(ramp() + static_cast<float>(x), load(distance.row(y) + x));
+      const V inside_x = clamp(at.x, 0, right);
+      const V inside_y = clamp(at.y, 0, bottom);
+      const I inside = at.used & I(inside_x == at.x) & I(inside_y == at.y);
+      const V r = abs(bilinear(seen.data, seen.stride, inside_x, inside_y) - load(reference.row(y) + x));
+      add(cost.row(y) + x, select(inside, min(r, set(kTruncated)), V{}), reset);
+      add(count.row(y) + x, select(inside, set(1.0F), V{}), reset);
     }
   }
 }
