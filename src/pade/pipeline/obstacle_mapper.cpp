@@ -10,6 +10,7 @@
 
 #include "pade/core/option_check.hpp"
 #include "pade/depth/derotation.hpp"
+#include "pade/depth/image/outlines.hpp"
 #include "pade/depth/pair_fusion.hpp"
 #include "pade/depth/prediction.hpp"
 #include "pade/flow/methods/clg.hpp"
@@ -127,6 +128,7 @@ ObstacleMapperOptions one_pair(ObstacleMapperOptions options) {
   options.prior_level = -1;
   options.refinement.on = false;
   options.edges.radius = 0;
+  options.outlines = false;
   options.views.count = 0;
   options.depth.flow_sigma_scale = 1;
   options.depth.flow_relative_sigma = 0;
@@ -287,6 +289,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   if (options_.depth.gates == depth::Gates::on) {
     const Stopwatch watch(update_, Stage::depth);
     depth::guard_edges(update_.depth, options_.edges);
+    if (options_.outlines) depth::bound_by_outlines(update_.depth);
   }
   update_.depth.time = reference.time;
   update_.reference = reference;

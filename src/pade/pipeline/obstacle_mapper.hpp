@@ -64,6 +64,7 @@ struct ObstacleMapperOptions {
   depth::MotionRefinementOptions refinement;
   depth::DepthOptions depth = depth::chain_options();
   depth::EdgeOptions edges;
+  bool outlines = true;
   ViewsOptions views;
   mapping::MapOptions map;
 
@@ -82,6 +83,7 @@ struct ObstacleMapperOptions {
           "the longest baseline is one over which four fifths of the image move less, px");
     field("refinement", self.refinement, "motion refined by the images");
     field("edges", self.edges, "depth at edges");
+    field("outlines", self.outlines, "patches without texture are bounded by what their outlines show");
     field("depth", self.depth, "depth from motion");
     field("views", self.views, "depth from several views");
     field("map", self.map, "occupancy map");
