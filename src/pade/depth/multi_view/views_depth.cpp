@@ -14,6 +14,7 @@ namespace {
 constexpr float kEpipoleRadius = 5;  // px: nearer to the epipole the parallax of a pair says little
 constexpr float kNearest = 0.05F;    // m
 constexpr int kBoundRadius = 2;      // px
+constexpr float kVague = 0.5F;       // px: sigma of the parallax from which on the image says nothing of it
 
 constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
 
@@ -151,6 +152,11 @@ class Reader {
   [[nodiscard]] float bound(float d, float sigma2) const {
     return scale_ / (std::max(d, 0.0F) + k_ * std::sqrt(sigma2));
   }
+  /// A pixel whose depth was no good.
+  static void drop(const Row& row, int u, DepthState why) {
+    row.depth[u] = row.variance[u] = row.own_variance[u] = std::numeric_limits<float>::quiet_NaN();
+    row.state[u] = code(why);
+  }
   /// Depth, variance and state in place of what pixel u has.
   void place(const Row& row, int u, float d, float sigma2) const {
     const float z = scale_ / d;
@@ -165,10 +171,9 @@ class Reader {
       row.state[u] = code(DepthState::measured);
       return;
     }
-    if (was_measured) {
-      row.depth[u] = row.variance[u] = row.own_variance[u] = std::numeric_limits<float>::quiet_NaN();
-      row.state[u] = code(DepthState::low_parallax);
-    }
+    if (row.state[u] == code(DepthState::epipole)) return;
+    const bool vague = sigma2 > kVague * kVague;
+    if (was_measured || vague) drop(row, u, vague ? DepthState::no_texture : DepthState::low_parallax);
     const bool low = row.state[u] == code(DepthState::low_parallax);
     if (low && row.bound[u] >= range_) row.state[u] = code(DepthState::far);
   }
@@ -205,7 +210,11 @@ void read_views(const ParallaxField& field, double scale, const DepthOptions& de
     const auto* matching = field.matching.ptr<float>(v);
     auto* bound = bounds.ptr<float>(v);
     for (int u = 0; u < image.depth.cols; ++u) {
-      if (is_blind(row.state[u]) || !(information[u] > 0)) continue;
+      if (is_blind(row.state[u])) continue;
+      if (!(information[u] > 0)) {
+        if (matching[u] > 0) Reader::drop(row, u, DepthState::no_texture);
+        continue;
+      }
       const float sigma2 = reader.variance(d[u], information[u], matching[u], spread[u]);
       bound[u] = reader.bound(d[u], sigma2);
       if (!(row.bound[u] >= bound[u])) row.bound[u] = bound[u];

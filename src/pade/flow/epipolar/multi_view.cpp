@@ -17,8 +17,8 @@
 namespace pade::flow {
 namespace {
 
-constexpr double kWindowSigma = 2.5;  // of the evidence
-constexpr int kWindowRadius = 5;
+constexpr double kWindowSigma = 1.2;  // of the evidence
+constexpr int kWindowRadius = 3;
 constexpr double kTensorSigma = 0.4;
 constexpr int kTensorRadius = 1;
 constexpr float kGreyNoise = 1;
@@ -156,7 +156,7 @@ void MultiViewEstimator::compete(const std::vector<View>& views) {
 }
 
 ParallaxField MultiViewEstimator::estimate(const cv::Mat& reference, const std::vector<View>& views,
-                                           const cv::Mat& initial) {
+                                           const cv::Mat& initial, double noise) {
   if (reference.type() != CV_8UC1 || reference.empty() || views.empty() || initial.type() != CV_32FC1 ||
       initial.size() != reference.size()) {
     return {};
@@ -239,7 +239,7 @@ ParallaxField MultiViewEstimator::estimate(const cv::Mat& reference, const std::
   evidence.wrong = b.wrong.view();
   evidence.taps = b.window.data();
   evidence.radius = kWindowRadius;
-  evidence.noise = kGreyNoise;
+  evidence.noise = std::max(kGreyNoise, static_cast<float>(noise));
   evidence.effective_size = static_cast<float>(effective_window(b.window));
   for (std::size_t i = 0; i < views.size(); ++i) {
     evidence.second = b.views[i].levels[0].view();

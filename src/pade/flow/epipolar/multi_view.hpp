@@ -73,8 +73,10 @@ class MultiViewEstimator {
 
   /// @param reference  CV_8UC1. @param views  of its size.
   /// @param initial    CV_32FC1, d to start from; NaN = 0.
+  /// @param noise  standard deviation of the grey values, where it is known; at least 1 is assumed.
   /// @return empty where there is no view, or sizes or types do not fit.
-  ParallaxField estimate(const cv::Mat& reference, const std::vector<View>& views, const cv::Mat& initial);
+  ParallaxField estimate(const cv::Mat& reference, const std::vector<View>& views, const cv::Mat& initial,
+                         double noise = 0);
 
  private:
   struct Buffers;

@@ -17,6 +17,8 @@ namespace {
 constexpr float kWrong = 0.1F;
 constexpr float kSlack = 0.5F;
 constexpr float kNoiseGradients = 2.0F;
+// Squared slopes, per grey^2 of noise, that are no texture: noise alone makes 0.9.
+constexpr float kSlopeNoise = 1.5F;
 constexpr float kTruncated = 20;  // grey values: farther off is as wrong
 constexpr int kChannels = 6;
 constexpr int kMatchedRows = 3;
@@ -204,7 +206,11 @@ void view_evidence(const ViewEvidence& e, bool reset, int first, int last, float
             const V limit = set(kWrong) + set(kSlack) / (1.0F + sqrt(dx * dx + dy * dy));
             const I bad = I(sum[5] - noise2 > limit * (2.0F * sum[2] + noise2));
             const I good = at.inside & ~bad;
-            const V information = select(good, e.effective_size * sum[0] / variance, V{});
+            const V ex = load(e.line.direction_x.row(y) + x);
+            const V ey = load(e.line.direction_y.row(y) + x);
+            const V of_noise = kSlopeNoise * e.noise * e.noise * (ex * ex + ey * ey);
+            const I texture = I(sum[0] > of_noise);
+            const V information = select(good & texture, e.effective_size * sum[0] / variance, V{});
             const V step = select(I(sum[0] > 0.0F), -sum[1] / max(sum[0], set(1e-9F)), V{});
             add(e.information.row(y) + x, information, reset);
             add(e.step.row(y) + x, information * step, reset);

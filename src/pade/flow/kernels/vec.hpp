@@ -72,6 +72,8 @@ PADE_INLINE void with_radius(int radius, const Work& work) {
   switch (radius) {
     case 1:
       return work(Fixed<1>());
+    case 3:
+      return work(Fixed<3>());
     case 4:
       return work(Fixed<4>());
     case 5:
