@@ -18,6 +18,14 @@ if(PADE_SANITIZE)
   endif()
 endif()
 
+# pade_compile_jointly(<target> <group> <file>...): in preset release these files are one source to the compiler, which
+# then reads their headers and makes their templates once. No two of them have the same name in an unnamed namespace.
+# Files of no group are compiled alone.
+function(pade_compile_jointly target group)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${group})
+endfunction()
+
 # pade_add_kernels(<target> <file.cpp>...): compile each file once per instruction set, with PADE_ISA
 # defined to baseline, avx2 or avx512. The file puts its functions into namespace PADE_ISA; the caller picks
 # one at run time with pade::simd::dispatch (core/simd.hpp). Kernel files include no heavy headers, so that no
