@@ -18,6 +18,34 @@ if(PADE_SANITIZE)
   endif()
 endif()
 
+# Headers that most sources of a kind include, read by the compiler once. ccache keeps nothing of a source that uses them,
+# and without joint compilation the point is that every source includes what it needs.
+set(_precompile OFF)
+if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(_precompile ON)
+endif()
+option(PADE_PRECOMPILE "Precompile the headers that most sources include" ${_precompile})
+
+# pade_precompile(<target> FOR <target>... HEADERS <header>...): the first target's headers, which the others share; all are
+# compiled with the same flags.
+function(pade_precompile owner)
+  cmake_parse_arguments(arg "" "" "FOR;HEADERS" ${ARGN})
+  if(PADE_PRECOMPILE)
+    target_precompile_headers(${owner} PRIVATE ${arg_HEADERS})
+    foreach(target IN LISTS arg_FOR)
+      target_precompile_headers(${target} REUSE_FROM ${owner})
+    endforeach()
+  endif()
+endfunction()
+
+# pade_compile_jointly(<target> <group> <file>...): in preset release these files are one source to the compiler, which
+# then reads their headers and makes their templates once. No two of them have the same name in an unnamed namespace.
+# Files of no group are compiled alone.
+function(pade_compile_jointly target group)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${group})
+endfunction()
+
 # pade_add_kernels(<target> <file.cpp>...): compile each file once per instruction set, with PADE_ISA
 # defined to baseline, avx2 or avx512. The file puts its functions into namespace PADE_ISA; the caller picks
 # one at run time with pade::simd::dispatch (core/simd.hpp). Kernel files include no heavy headers, so that no

@@ -25,7 +25,7 @@ namespace {
 using evaluation::DepthAccuracy;
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+struct EvaluateArguments {
   std::vector<std::string> runs;
   std::string sequence;
   std::string csv;
@@ -48,7 +48,7 @@ Result<io::Sequence> open_as_the_run_did(const std::filesystem::path& folder, co
 }
 
 // From the depth images and the truth where both are there, else what the run wrote down.
-Result<DepthAccuracy> accuracy_of(const std::string& folder, const Arguments& arguments) {
+Result<DepthAccuracy> accuracy_of(const std::string& folder, const EvaluateArguments& arguments) {
   const Result<io::Run> run = io::read_run(folder);
   if (!run) return run.error();
   const bool asked = !arguments.sequence.empty();
@@ -88,7 +88,7 @@ std::string csv_of(const std::vector<std::string>& names, const std::vector<Dept
   return csv;
 }
 
-Status evaluate_depth(const Arguments& arguments) {
+Status evaluate_depth(const EvaluateArguments& arguments) {
   std::vector<std::string> names = arguments.runs;
   std::vector<DepthAccuracy> all;
   for (const std::string& run : arguments.runs) {
@@ -117,7 +117,7 @@ Status evaluate_depth(const Arguments& arguments) {
   return {};
 }
 
-Status evaluate(const Arguments& arguments) {
+Status evaluate(const EvaluateArguments& arguments) {
   if (arguments.map.world.empty()) return evaluate_depth(arguments);
   EvaluateMapArguments map = arguments.map;
   map.runs = arguments.runs;
@@ -153,7 +153,7 @@ void add_map_options(CLI::App& command, EvaluateMapArguments& map) {
 }  // namespace
 
 void add_evaluate(CLI::App& app, Context& context) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateArguments>();
   CLI::App* command = app.add_subcommand("evaluate", "Say how accurate the depth of a run was, or its map.");
   command->footer(
       "Errors are compared with the true depth of the sequence, in ranges of true depth. With the depth "

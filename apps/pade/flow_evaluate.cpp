@@ -26,7 +26,7 @@
 namespace pade::cli {
 namespace {
 
-struct Arguments {
+struct FlowEvaluateArguments {
   std::vector<std::string> folders;
   std::vector<std::string> methods;
   int repetitions = 0;
@@ -93,7 +93,7 @@ Result<LoadedPair> load(const io::FlowPair& pair) {
 }
 
 // The pairs of a folder: with flow files, or those of a recording whose flow follows from depth and poses.
-Result<std::vector<LoadedPair>> load(const std::string& folder, const Arguments& arguments) {
+Result<std::vector<LoadedPair>> load(const std::string& folder, const FlowEvaluateArguments& arguments) {
   std::vector<LoadedPair> loaded;
   const auto pairs = io::find_flow_pairs(folder);
   if (pairs) {
@@ -122,7 +122,7 @@ using Times = std::map<std::string, std::vector<double>>;  // by method, millise
 
 // All methods take turns with the reference, so that a disturbed machine disturbs all alike.
 std::map<std::string, FlowTiming> time_methods(const Methods& methods, const LoadedPair& pair,
-                                               const Arguments& arguments, Progress& progress) {
+                                               const FlowEvaluateArguments& arguments, Progress& progress) {
   const auto reference = flow::make_flow_estimator("opencv-farneback");
   std::vector<double> reference_times;
   Times times;
@@ -142,7 +142,7 @@ std::map<std::string, FlowTiming> time_methods(const Methods& methods, const Loa
 
 // Times are compared at one size: the median over the 640 x 480 pairs where there are any, else over all.
 std::map<std::string, FlowTiming> time_methods(const Methods& methods, const std::vector<LoadedPair>& pairs,
-                                               const Arguments& arguments) {
+                                               const FlowEvaluateArguments& arguments) {
   constexpr int kWidth = 640;
   constexpr int kHeight = 480;
   std::vector<const LoadedPair*> chosen;
@@ -166,7 +166,7 @@ std::map<std::string, FlowTiming> time_methods(const Methods& methods, const std
 }
 
 FlowFolderScores score(const Methods& methods, const std::string& folder,
-                       const std::vector<LoadedPair>& pairs, const Arguments& arguments) {
+                       const std::vector<LoadedPair>& pairs, const FlowEvaluateArguments& arguments) {
   FlowFolderScores scores;
   scores.folder = folder;
   for (const auto& method : methods) scores.methods.push_back({std::string(method->name()), {}, {}});
@@ -188,7 +188,7 @@ FlowFolderScores score(const Methods& methods, const std::string& folder,
   return scores;
 }
 
-Status evaluate(const Arguments& arguments) {
+Status evaluate(const FlowEvaluateArguments& arguments) {
   flow::FlowOptions options;
   options.confidence = from_name<flow::FlowConfidence>(arguments.confidence).value_or(options.confidence);
   Methods methods;
@@ -213,7 +213,7 @@ Status evaluate(const Arguments& arguments) {
 
 void add_flow_evaluate(CLI::App& flow, Context& context) {
   CLI::App* command = flow.add_subcommand("evaluate", "Compares methods on image pairs with known flow.");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<FlowEvaluateArguments>();
   command->footer(
       "A folder holds pairs as Middlebury and KITTI lay them out, or is a sequence with true depth and "
       "poses, "

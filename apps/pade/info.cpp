@@ -37,7 +37,7 @@ using evaluation::Spread;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-struct Arguments {
+struct InfoArguments {
   std::string path;
   std::string poses = "groundtruth";
   std::string world_up;
@@ -209,7 +209,7 @@ void print_hardness(const SceneHardness& hardness) {
 }
 
 /// The sequences that lie in a folder, each with its scene, and all of them together.
-Status inform_of_set(const Arguments& arguments, const std::vector<io::Sequence>& sequences) {
+Status inform_of_set(const InfoArguments& arguments, const std::vector<io::Sequence>& sequences) {
   SceneHardness total;
   Json rows = Json::array();
   std::string table;
@@ -258,7 +258,7 @@ std::vector<io::Sequence> sequences_in(const fs::path& path, const io::SequenceO
   return found;
 }
 
-Status inform_of_sequence(const Arguments& arguments) {
+Status inform_of_sequence(const InfoArguments& arguments) {
   io::SequenceOptions options;
   options.poses = arguments.poses;
   options.world_up = arguments.world_up;
@@ -286,7 +286,7 @@ Status inform_of_sequence(const Arguments& arguments) {
   return {};
 }
 
-Status inform_of_map(const Arguments& arguments) {
+Status inform_of_map(const InfoArguments& arguments) {
   const Result<mapping::OccupancyMap> map = io::read_map(arguments.path);
   if (!map) return map.error();
   const double voxel = map->options().voxel;
@@ -347,7 +347,7 @@ Json json_of(const io::Calibration& calibration) {
   return json;
 }
 
-Status inform_of_calibration(const Arguments& arguments) {
+Status inform_of_calibration(const InfoArguments& arguments) {
   const auto calibration = io::read_calibration(arguments.path, arguments.camera);
   if (!calibration) return calibration.error();
   if (!calibration->camera)
@@ -418,7 +418,7 @@ void print_run(const io::Run& run, const std::optional<evaluation::DepthAccuracy
   if (accuracy) fmt::print("\n{}", evaluation::to_table(*accuracy));
 }
 
-Status inform_of_run(const Arguments& arguments) {
+Status inform_of_run(const InfoArguments& arguments) {
   const Result<io::Run> run = io::read_run(arguments.path);
   if (!run) return run.error();
   const Result<std::optional<evaluation::DepthAccuracy>> accuracy = evaluation::stored_accuracy(*run);
@@ -437,7 +437,7 @@ Status inform_of_run(const Arguments& arguments) {
   return {};
 }
 
-Status inform(const Arguments& arguments) {
+Status inform(const InfoArguments& arguments) {
   const fs::path path = arguments.path;
   std::error_code code;
   if (!fs::exists(path, code)) {
@@ -455,7 +455,7 @@ Status inform(const Arguments& arguments) {
 }  // namespace
 
 void add_info(CLI::App& app, Context& context) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<InfoArguments>();
   CLI::App* command =
       app.add_subcommand("info", "Say what is in a sequence, a map or a run, and whether it is sane.");
   command->footer(

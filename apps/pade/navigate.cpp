@@ -27,7 +27,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr const char* kMarker = "relative_motion.csv";
 
-struct Arguments {
+struct NavigateArguments {
   std::string log;
   std::string out;
   std::string gnss;
@@ -50,7 +50,7 @@ struct Arguments {
 };
 
 /// Lever arm, and what a calibration says of where the camera sits.
-Status set_mounting(const Arguments& arguments, NavigationRunOptions& options) {
+Status set_mounting(const NavigateArguments& arguments, NavigationRunOptions& options) {
   if (!arguments.calibration.empty()) {
     const auto calibration = io::read_calibration(arguments.calibration, arguments.camera);
     if (!calibration) return calibration.error();
@@ -73,7 +73,7 @@ Status set_mounting(const Arguments& arguments, NavigationRunOptions& options) {
   return {};
 }
 
-Result<NavigationRunOptions> run_options(const Arguments& arguments, const NavigationLog& log) {
+Result<NavigationRunOptions> run_options(const NavigateArguments& arguments, const NavigationLog& log) {
   NavigationRunOptions options;
   options.rate = arguments.rate;
   options.on_road = arguments.vehicle == "road";
@@ -149,7 +149,7 @@ nlohmann::json summary(const NavigationRun& run, const Score& score, const std::
   return json;
 }
 
-Status navigate(const Arguments& arguments) {
+Status navigate(const NavigateArguments& arguments) {
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kMarker);
   if (!output) return output.error();
@@ -202,7 +202,7 @@ Status navigate(const Arguments& arguments) {
 
 void add_navigate(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("navigate", "Trajectory and frame-to-frame motion from IMU and GNSS");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<NavigateArguments>();
   command
       ->add_option("log", arguments->log,
                    "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md)")

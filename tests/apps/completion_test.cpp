@@ -12,15 +12,16 @@
 
 #include "pade/flow/flow_estimator.hpp"
 
+#include "apps/run_program.hpp"
+
 namespace pade {
 namespace {
 
+using test::kPade;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
 using ::testing::Not;
-
-const std::string kPade = PADE_PROGRAM;
 
 /// Standard output of a shell command.
 std::string output_of(const std::string& command) {

@@ -38,6 +38,16 @@ TEST(Pose, ExponentialInvertsTheLogarithmUpToHalfATurn) {
   EXPECT_LT((rotation_log(rotation_exp({1e-12, 0, 0})) - Eigen::Vector3d(1e-12, 0, 0)).norm(), 1e-20);
 }
 
+TEST(Pose, TheRotationBetweenTwoDirectionsTurnsByTheirAngleAndNoMore) {
+  const Eigen::Vector3d from(0.3, -2, 0.7);
+  for (const Eigen::Vector3d& to : {Eigen::Vector3d(1, 1, -4), from, Eigen::Vector3d(-3 * from)}) {
+    const Eigen::Quaterniond turn = rotation_between(from, to);
+    EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-7);
+    const double angle = std::atan2(from.cross(to).norm(), from.dot(to));
+    EXPECT_NEAR(rotation_log(turn).norm(), angle, 1e-7);
+  }
+}
+
 TEST(Pose, InterpolationMeetsBothEndsAndMovesAtConstantBodyVelocity) {
   std::mt19937 random(3);
   for (int i = 0; i < 100; ++i) {

@@ -84,6 +84,10 @@ RelativeMotion relative_motion(const Pose& T_world_reference, const Pose& T_worl
   return motion;
 }
 
+Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  return Eigen::Quaterniond::FromTwoVectors(from, to);
+}
+
 Eigen::Matrix3d forward_camera_rotation() {
   return (Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();
 }

@@ -29,6 +29,9 @@ Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation);
 Eigen::Vector3d rotation_log(const Eigen::Quaterniond& rotation);
 /// The rotation of a rotation vector: the exponential of SO(3).
 Eigen::Quaterniond rotation_exp(const Eigen::Vector3d& rotation_vector);
+/// The least rotation that turns the direction of `from` into that of `to`; neither is zero. It is Eigen's
+/// FromTwoVectors, which is dear to compile: once is enough.
+Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// The pose a fraction `s` in [0, 1] of the way from `a` to `b` at constant body velocity on SE(3):
 /// a * exp(s log(a^-1 b)).

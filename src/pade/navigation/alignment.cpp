@@ -25,10 +25,10 @@ double azimuth(const Vector3d& w) { return std::atan2(w.y(), w.x()); }
 
 /// The rotation by which the measured up direction of the body becomes `up` of the world, at the given yaw.
 Quaterniond attitude(const Vector3d& measured, const Vector3d& up, double yaw) {
-  const Quaterniond level = Quaterniond::FromTwoVectors(measured, Vector3d::UnitZ());
+  const Quaterniond level = rotation_between(measured, Vector3d::UnitZ());
   const double turn = yaw - azimuth(level * yaw_axis(level));
   const Quaterniond turned = rotation_exp({0, 0, turn}) * level;
-  return (Quaterniond::FromTwoVectors(turned * measured, up) * turned).normalized();
+  return (rotation_between(turned * measured, up) * turned).normalized();
 }
 
 /// Covariance of φ for independent errors about the world's axes.

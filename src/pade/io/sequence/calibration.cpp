@@ -13,9 +13,6 @@
 namespace pade::io {
 namespace {
 
-constexpr std::string_view kFocal = "a positive focal length in pixels";
-constexpr std::string_view kModel = "none, plumb_bob, rational_polynomial or equidistant";
-
 using Fields = CalibrationFields;
 using dialect::finish;
 using dialect::read_time_offset;

@@ -20,6 +20,11 @@
 
 namespace pade::io {
 
+// What is expected of fields that several dialects have.
+inline constexpr std::string_view kFocal = "a positive focal length in pixels";
+inline constexpr std::string_view kSize = "a whole number of pixels";
+inline constexpr std::string_view kModel = "none, plumb_bob, rational_polynomial or equidistant";
+
 class CalibrationFields {
  public:
   CalibrationFields(const Yaml& map, std::string file) : map_(map), file_(std::move(file)) {}

@@ -7,6 +7,8 @@
 
 #include <Eigen/Geometry>
 
+#include "pade/core/pose.hpp"
+
 namespace pade::simulation {
 namespace {
 
@@ -63,7 +65,7 @@ AmbientOcclusion::AmbientOcclusion(const Geometry& geometry, NearestHit nearest)
 }
 
 float AmbientOcclusion::trace(const Eigen::Vector3d& position, const Eigen::Vector3d& normal) const {
-  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
+  const Eigen::Quaterniond turn = rotation_between(Eigen::Vector3d::UnitZ(), normal);
   const Eigen::Vector3d origin = position + kLift * normal;
   double closed = 0;
   for (std::size_t first = 0; first < kRays; first += ray_packet_size) {

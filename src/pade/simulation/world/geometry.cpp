@@ -7,6 +7,8 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "pade/core/pose.hpp"
+
 namespace pade::simulation {
 namespace {
 
@@ -41,8 +43,7 @@ class Builder {
     }
   }
   void operator()(const Rectangle& rectangle) {
-    const Eigen::Quaterniond turn =
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), rectangle.normal);
+    const Eigen::Quaterniond turn = rotation_between(Eigen::Vector3d::UnitZ(), rectangle.normal);
     face(Eigen::Vector3d::Zero(), rectangle.normal.normalized(), turn * Eigen::Vector3d::UnitX(),
          turn * Eigen::Vector3d::UnitY(), rectangle.size.x(), rectangle.size.y());
   }

@@ -45,7 +45,7 @@ class Tessellator {
     }
   }
   void operator()(const Rectangle& rectangle) {
-    const auto turn = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), rectangle.normal);
+    const Eigen::Quaterniond turn = rotation_between(Vector3d::UnitZ(), rectangle.normal);
     quad([&](double a, double b) {
       return Vector3d(turn * Vector3d((a - 0.5) * rectangle.size.x(), (b - 0.5) * rectangle.size.y(), 0));
     });

@@ -14,8 +14,6 @@ constexpr std::string_view kIntrinsics =
 constexpr std::string_view kMatrix =
     "a 3x3 camera matrix fx 0 cx, 0 fy cy, 0 0 1 with positive focal lengths";
 constexpr std::string_view kCoefficients = "a list of finite distortion coefficients";
-constexpr std::string_view kModel = "none, plumb_bob, rational_polynomial or equidistant";
-constexpr std::string_view kSize = "a whole number of pixels";
 
 using Fields = CalibrationFields;
 

@@ -11,8 +11,6 @@ namespace {
 
 using Fields = CalibrationFields;
 
-constexpr std::string_view kSize = "a whole number of pixels";
-constexpr std::string_view kFocal = "a positive focal length in pixels";
 constexpr std::string_view kCentre = "the principal point in pixels";
 
 /// The numbers of fields `prefix` + k1, k2 ... in this order; those that are missing at the end are left out.
