@@ -1,0 +1,149 @@
+#include "pade/depth/multi_view/views_depth.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "depth/depth_scene.hpp"
+
+namespace pade::depth {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr double kScale = 1000;  // px m
+constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
+
+/// One pixel of a pair that knows `state` and a depth of 9 m, and of the views.
+struct Pixel {
+  DepthImage image;
+  ParallaxField field;
+
+  Pixel(DepthState state, float d, float information, float matching = 3, float spread = 0) {
+    const bool measured = state == DepthState::measured;
+    const auto one = [](float value) { return cv::Mat(9, 9, CV_32FC1, cv::Scalar(value)); };
+    image.depth = one(measured ? 9 : kNan);
+    image.variance = one(measured ? 1.5F : kNan);
+    image.own_variance = one(measured ? 1 : kNan);
+    image.bound = one(state == DepthState::measured ? 5 : kNan);
+    image.state = cv::Mat(9, 9, CV_8UC1, cv::Scalar(code(state)));
+    field = {one(d), one(information), one(0), one(spread), one(matching), one(0)};
+  }
+  void read(const DepthOptions& depth = {}, const ViewsDepthOptions& options = {}) {
+    read_views(field, kScale, depth, options, image);
+  }
+  [[nodiscard]] float z() const { return image.depth.at<float>(4, 4); }
+  [[nodiscard]] float own() const { return image.own_variance.at<float>(4, 4); }
+  [[nodiscard]] float variance() const { return image.variance.at<float>(4, 4); }
+  [[nodiscard]] float bound() const { return image.bound.at<float>(4, 4); }
+  [[nodiscard]] std::uint8_t state() const { return image.state.at<std::uint8_t>(4, 4); }
+};
+
+TEST(ViewsDepth, TakesThePlaceOfThePairWithItsOwnVariance) {
+  Pixel p(DepthState::measured, 125, 100);
+  p.read({}, {.sigma_scale = 1, .relative_sigma = 0});
+  EXPECT_FLOAT_EQ(p.z(), 8);
+  // sigma of d is 0.1 px: sigma_Z = Z^2 / scale * 0.1
+  EXPECT_NEAR(std::sqrt(p.own()), 64 / kScale * 0.1, 1e-5);
+  // what is common to the image is that of 1/Z
+  EXPECT_NEAR(p.variance() - p.own(), 0.5 * std::pow(8.0 / 9, 4), 1e-5);
+  EXPECT_EQ(p.state(), code(DepthState::measured));
+}
+
+TEST(ViewsDepth, ViewsThatContradictEachOtherAreLessCertain) {
+  Pixel agree(DepthState::measured, 125, 100, 3, 2);
+  Pixel contradict(DepthState::measured, 125, 100, 3, 32);
+  agree.read({}, {.sigma_scale = 1, .relative_sigma = 0});
+  contradict.read({}, {.sigma_scale = 1, .relative_sigma = 0});
+  EXPECT_NEAR(contradict.own() / agree.own(), 16, 0.1);
+}
+
+TEST(ViewsDepth, TheBoundKeepsSomeSigmasAndNeverExceedsThoseAround) {
+  DepthOptions options;
+  Pixel p(DepthState::low_parallax, 20, 1);
+  p.read(options, {.sigma_scale = 1, .relative_sigma = 0});
+  EXPECT_NEAR(p.bound(), kScale / (20 + options.bound_sigmas), 1e-3);
+  Pixel beside(DepthState::low_parallax, 20, 1);
+  beside.field.distance.at<float>(4, 6) = 100;
+  beside.read(options, {.sigma_scale = 1, .relative_sigma = 0});
+  EXPECT_NEAR(beside.bound(), kScale / (100 + options.bound_sigmas), 1e-3);
+  // of the pair, where it is greater
+  Pixel greater(DepthState::measured, 300, 100);
+  greater.read();
+  EXPECT_GE(greater.bound(), 3.2F);
+}
+
+TEST(ViewsDepth, StatesSayWhyThereIsNoDepth) {
+  Pixel far(DepthState::measured, 20, 100);  // 50 m
+  far.read();
+  EXPECT_TRUE(std::isnan(far.z()));
+  EXPECT_EQ(far.state(), code(DepthState::far));
+  Pixel blank(DepthState::measured, 125, 0);
+  blank.read();
+  EXPECT_TRUE(std::isnan(blank.z()));
+  EXPECT_TRUE(std::isnan(blank.variance()));
+  EXPECT_EQ(blank.state(), code(DepthState::no_texture));
+  Pixel vague(DepthState::measured, 2, 1);  // 2 +- 1 px
+  vague.read();
+  EXPECT_EQ(vague.state(), code(DepthState::no_texture));
+}
+
+/// A pixel that no view sees, and one that the pair knows to be doubtful, keep what they have.
+TEST(ViewsDepth, LeavesAloneWhatTheViewsDoNotKnowBetter) {
+  Pixel unseen(DepthState::measured, 125, 0, 0);
+  unseen.read();
+  EXPECT_FLOAT_EQ(unseen.z(), 9);
+  for (const DepthState state : {DepthState::inconsistent, DepthState::out_of_view, DepthState::no_texture}) {
+    Pixel p(state, 125, 100);
+    p.read();
+    EXPECT_EQ(p.state(), code(state));
+    EXPECT_TRUE(std::isnan(p.z()));
+    EXPECT_TRUE(std::isnan(p.bound()));
+  }
+}
+
+/// Exact flow and exact depth of the frame before: the start is the depth, to a tenth of a per cent where
+/// both frames see the same surface.
+TEST(ViewsDepth, TheSearchStartsWhereTheLastFrameHasEnded) {
+  const ScenePair pair(simulation::analytic_camera(160, 120), {0.02, 0.01, -0.2}, {0.01, -0.02, 0.005});
+  DepthImage none;
+  none.depth = cv::Mat(pair.truth.size(), CV_32FC1, cv::Scalar(kNan));
+  const cv::Mat last_truth = simulation::exact_depth(pair.flight.scene, pair.camera, pair.T_world_other);
+  const InverseDepthImage last{pair.T_world_other, 1 / last_truth};
+  // flow that is 10 % short
+  const cv::Mat flow(pair.truth.size(), CV_32FC2);
+  const Eigen::Vector3d t = pair.motion.t_reference_other;
+  for (int v = 0; v < flow.rows; ++v) {
+    for (int u = 0; u < flow.cols; ++u) {
+      const double z = pair.truth.at<float>(v, u) - t.z();
+      const double x = u - pair.camera.cx;
+      const double y = v - pair.camera.cy;
+      const_cast<cv::Mat&>(flow).at<cv::Vec2f>(v, u) = {
+          static_cast<float>(0.9 * (x * t.z() - pair.camera.fx * t.x()) / z),
+          static_cast<float>(0.9 * (y * t.z() - pair.camera.fy * t.y()) / z)};
+    }
+  }
+  const auto right = [&](const InverseDepthImage& from) {
+    const cv::Mat rho =
+        start_of_views(none, flow, pair.camera, pair.motion, pair.T_world_reference, from, 1, {});
+    EXPECT_TRUE(cv::checkRange(rho));
+    int count = 0;
+    int all = 0;
+    for (int v = 2; v < flow.rows - 2; ++v) {
+      for (int u = 2; u < flow.cols - 2; ++u) {
+        const float z = pair.truth.at<float>(v, u);
+        if (!std::isfinite(z)) continue;
+        ++all;
+        if (std::abs(z * rho.at<float>(v, u) - 1) < 2e-3F) ++count;
+      }
+    }
+    return static_cast<double>(count) / all;
+  };
+  EXPECT_LT(right({}), 0.1);
+  EXPECT_GT(right(last), 0.6);
+  // One that disagrees is not taken.
+  EXPECT_LT(right({pair.T_world_other, 2 / last_truth}), 0.1);
+}
+
+}  // namespace
+}  // namespace pade::depth

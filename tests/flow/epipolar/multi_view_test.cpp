@@ -1,0 +1,230 @@
+#include "pade/flow/epipolar/multi_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "pade/core/random.hpp"
+
+namespace pade::flow {
+namespace {
+
+constexpr int kWidth = 200;
+constexpr int kHeight = 140;
+
+/// Parallax, px, of the pixels of the reference at a camera step of 1.
+using Parallax = std::function<double(int x, int y)>;
+
+/// Texture without a grid: grey values of a surface at column `x`.
+double surface(double x, double y, double phase) {
+  return 128 + 28 * std::sin(0.55 * x + 0.21 * y + phase) + 22 * std::sin(0.31 * x - 0.47 * y + 2 * phase) +
+         18 * std::sin(0.93 * x + 0.71 * y + 3 * phase);
+}
+
+struct Surface {
+  double parallax;     ///< px per step
+  double left, right;  ///< columns of the reference between which it is
+  double phase;
+};
+
+/// What a camera sees that has gone `step` to the right: surfaces shift left by step * parallax; the nearest
+/// in front.
+cv::Mat seen(const std::vector<Surface>& surfaces, double step, double noise, std::uint64_t seed) {
+  Random random(seed);
+  cv::Mat image(kHeight, kWidth, CV_8UC1);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      double grey = 128;
+      double nearest = -1;
+      for (const Surface& s : surfaces) {
+        const double on = x + step * s.parallax;  // column of the reference
+        if (on < s.left || on >= s.right || s.parallax <= nearest) continue;
+        nearest = s.parallax;
+        grey = surface(on, y, s.phase);
+      }
+      image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(grey + noise * random.normal());
+    }
+  }
+  return image;
+}
+
+/// The view at `step`: p' = p - d * step * (1, 0).
+View view(const std::vector<Surface>& surfaces, double step, double noise, std::uint64_t seed) {
+  View v;
+  v.image = seen(surfaces, step, noise, seed);
+  v.e = {static_cast<float>(-step), 0, 0};
+  return v;
+}
+
+cv::Mat constant(double value) { return {kHeight, kWidth, CV_32FC1, cv::Scalar(value)}; }
+
+/// Of |d - truth| over the columns [from, to), 20 px away from the borders.
+double median_error(const cv::Mat& distance, double truth, int from = 40, int to = kWidth - 20) {
+  std::vector<double> errors;
+  for (int y = 20; y < kHeight - 20; ++y) {
+    for (int x = from; x < to; ++x) errors.push_back(std::abs(distance.at<float>(y, x) - truth));
+  }
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
+                   errors.end());
+  return errors[errors.size() / 2];
+}
+
+double mean_over(const cv::Mat& values) {
+  return cv::mean(values(cv::Rect(40, 20, kWidth - 60, kHeight - 40)))[0];
+}
+
+const std::vector<Surface> kWall = {{2.5, -1e3, 1e3, 0.3}};
+
+TEST(MultiView, FindsTheParallaxThatAllViewsShare) {
+  const cv::Mat reference = seen(kWall, 0, 0, 1);
+  MultiViewOptions options;
+  options.warps = 4;
+  MultiViewEstimator estimator(options);
+  const ParallaxField field =
+      estimator.estimate(reference, {view(kWall, 1, 0, 2), view(kWall, 2, 0, 3)}, constant(2.1));
+  ASSERT_FALSE(field.empty());
+  EXPECT_LT(median_error(field.distance, 2.5), 0.03);
+  EXPECT_GT(mean_over(field.matching), 1.99);
+  EXPECT_LT(mean_over(field.wrong), 0.01);
+}
+
+TEST(MultiView, LongerBaselinesAreMorePrecise) {
+  const cv::Mat reference = seen(kWall, 0, 3, 1);
+  MultiViewEstimator estimator;
+  const auto error = [&](std::vector<double> steps) {
+    std::vector<View> views;
+    for (const double step : steps) views.push_back(view(kWall, step, 3, 7 + views.size()));
+    return median_error(estimator.estimate(reference, views, constant(2.4)).distance, 2.5);
+  };
+  const double one = error({1});
+  EXPECT_LT(error({1, 2}), 0.75 * one);
+  EXPECT_LT(error({1, 2, 4}), 0.45 * one);
+}
+
+/// Monte-Carlo: errors are as large as the information says, within a factor of two, for any noise.
+TEST(MultiView, InformationIsTheInverseOfTheVariance) {
+  for (const double noise : {2.0, 6.0}) {
+    const cv::Mat reference = seen(kWall, 0, noise, 1);
+    MultiViewOptions options;
+    options.alpha = 0.05;  // the smoothness term knows more than the window that information speaks of
+    options.median = 0;
+    MultiViewEstimator estimator(options);
+    const ParallaxField field = estimator.estimate(
+        reference, {view(kWall, 1, noise, 2), view(kWall, 2, noise, 3), view(kWall, 4, noise, 4)},
+        constant(2.5), noise);
+    double squares = 0;
+    int count = 0;
+    for (int y = 20; y < kHeight - 20; ++y) {
+      for (int x = 40; x < kWidth - 20; ++x) {
+        const double error = field.distance.at<float>(y, x) - 2.5;
+        const double information = field.information.at<float>(y, x);
+        if (!(information > 0)) continue;
+        squares += std::min(error * error * information, 25.0);
+        ++count;
+      }
+    }
+    ASSERT_GT(count, 5000);
+    const double ratio = std::sqrt(squares / count);
+    EXPECT_GT(ratio, 0.4) << noise;
+    EXPECT_LT(ratio, 2.0) << noise;
+  }
+}
+
+TEST(MultiView, AViewOfSomethingElseIsOutvotedAndCounted) {
+  const cv::Mat reference = seen(kWall, 0, 1, 1);
+  const std::vector<Surface> other = {{2.5, -1e3, 1e3, 2.2}};
+  MultiViewEstimator estimator;
+  const std::vector<View> good = {view(kWall, 1, 1, 2), view(kWall, 2, 1, 3)};
+  std::vector<View> mixed = good;
+  mixed.push_back(view(other, 4, 1, 4));
+  const ParallaxField field = estimator.estimate(reference, mixed, constant(2.4));
+  EXPECT_LT(median_error(field.distance, 2.5), 0.12);
+  EXPECT_GT(mean_over(field.wrong), 0.8);
+  EXPECT_LT(mean_over(field.wrong), 1.2);
+}
+
+TEST(MultiView, NoiseIsNoTexture) {
+  const std::vector<Surface> nothing;
+  const cv::Mat reference = seen(nothing, 0, 1.5, 1);
+  MultiViewEstimator estimator;
+  const ParallaxField field =
+      estimator.estimate(reference, {view(nothing, 2, 1.5, 2), view(nothing, 4, 1.5, 3)}, constant(1), 1.5);
+  const cv::Mat known = field.information > 0;
+  EXPECT_LT(cv::countNonZero(known), 0.1 * static_cast<double>(known.total()));
+}
+
+/// A start that has let a pole grow by 4 px on both sides: gradients do not find the way back, neighbours do.
+TEST(MultiView, BesideAnEdgeTheOtherSideMayWin) {
+  std::vector<Surface> scene = kWall;
+  scene.push_back({9, 90, 102, 1.4});
+  const cv::Mat reference = seen(scene, 0, 1, 1);
+  const std::vector<View> views = {view(scene, 0.5, 1, 2), view(scene, 1, 1, 3), view(scene, 2, 1, 4)};
+  cv::Mat start = constant(2.5);
+  start.colRange(86, 106) = 9;
+  const auto wrong = [&](int reach) {
+    MultiViewOptions options;
+    options.reach = reach;
+    MultiViewEstimator estimator(options);
+    const cv::Mat d = estimator.estimate(reference, views, start).distance;
+    int count = 0;
+    for (int y = 20; y < kHeight - 20; ++y) {
+      for (int x = 80; x < 112; ++x) {
+        const double truth = x >= 90 && x < 102 ? 9 : 2.5;
+        if (std::abs(d.at<float>(y, x) - truth) > 0.25 * truth) ++count;
+      }
+    }
+    return count;
+  };
+  EXPECT_LT(wrong(5), 0.4 * wrong(0));
+}
+
+/// Points that have moved too far for a view, or come too near, are left to others.
+TEST(MultiView, AViewIsUsedUpToALimitOfParallaxAndOfScale) {
+  const cv::Mat reference = seen(kWall, 0, 1, 1);
+  const std::vector<View> views = {view(kWall, 1, 1, 2), view(kWall, 4, 1, 3)};
+  MultiViewOptions options;
+  options.largest_parallax = 8;
+  MultiViewEstimator near(options);
+  EXPECT_NEAR(mean_over(near.estimate(reference, views, constant(2.5)).matching), 1, 0.02);
+  options.largest_parallax = 12;
+  MultiViewEstimator both(options);
+  EXPECT_NEAR(mean_over(both.estimate(reference, views, constant(2.5)).matching), 2, 0.02);
+
+  View forward;
+  forward.image = reference;
+  forward.e = {0, 0, 0.2F};  // at d = 1: Z' / Z = 1.2
+  options.largest_scale = 1.1;
+  options.warps = 0;
+  MultiViewEstimator scaled(options);
+  const ParallaxField field = scaled.estimate(reference, {forward}, constant(1));
+  EXPECT_EQ(cv::countNonZero(field.matching + field.wrong), 0);
+}
+
+TEST(MultiView, ViewsAndStartThatDoNotFitGiveNothing) {
+  const cv::Mat reference = seen(kWall, 0, 0, 1);
+  const View good = view(kWall, 1, 0, 2);
+  View small = good;
+  small.image = good.image(cv::Rect(0, 0, 50, 50)).clone();
+  MultiViewEstimator estimator;
+  EXPECT_TRUE(estimator.estimate(reference, {}, constant(1)).empty());
+  EXPECT_TRUE(estimator.estimate(reference, {small}, constant(1)).empty());
+  EXPECT_TRUE(estimator.estimate(reference, {good}, cv::Mat()).empty());
+  EXPECT_TRUE(estimator.estimate(cv::Mat(), {good}, constant(1)).empty());
+}
+
+TEST(MultiView, AStartThatIsNoNumberCountsAsInfinity) {
+  const cv::Mat reference = seen(kWall, 0, 0, 1);
+  MultiViewEstimator estimator;
+  const ParallaxField field = estimator.estimate(reference, {view(kWall, 0.4, 0, 2)},
+                                                 constant(std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_TRUE(cv::checkRange(field.distance));
+  EXPECT_LT(median_error(field.distance, 2.5), 0.4);
+}
+
+}  // namespace
+}  // namespace pade::flow
