@@ -184,6 +184,31 @@ TEST_P(Faults, OfTheGnssAreNoticed) {
   }
 }
 
+TEST(NoFaults, TheOtherRecordingsAreNeverLost) {
+  if (!fs::exists(kData)) GTEST_SKIP() << kData << " is not here";
+  for (const bool car : {true, false}) {
+    const auto log = io::read_navigation_log(kData / (car ? "car_drive_rtk" : "quad_px4_flow"), {});
+    ASSERT_TRUE(log.ok());
+    for (const bool second : {false, true}) {  // the car on its wheels, the quadrotor as of the other class
+      NavigatorOptions options;
+      options.filter = FilterOptions::of(car || second ? ImuClass::consumer : ImuClass::industrial);
+      options.gnss_position_latency = car ? -0.1 : 0;
+      ReplayOptions replay_options;
+      replay_options.road_rate = car && second ? 5 : 0;
+      Navigator navigator(options);
+      replay(*log, navigator, replay_options, nullptr);
+      const Health health = navigator.health();
+      std::printf("%s: %.0f s, lost %d times, velocities doubted %d times, restarts %d\n",
+                  car ? "car" : "quadrotor", seconds_between(log->imu.front().time, log->imu.back().time),
+                  static_cast<int>(health.times_lost), static_cast<int>(health.velocity_doubted),
+                  static_cast<int>(health.restarts));
+      EXPECT_EQ(health.times_lost, 0U);
+      EXPECT_EQ(health.velocity_doubted, 0U);
+      EXPECT_EQ(health.restarts, 0U);
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Recordings, Faults,
                          testing::Values(std::pair{"gnss_spp_5hz.csv", ImuClass::consumer},
                                          std::pair{"gnss_spp_5hz.csv", ImuClass::industrial},

@@ -63,6 +63,9 @@ Outcome fly(const std::function<void(NavigationLog&)>& spoil, double heading_rat
       outcome.noticed = std::min(outcome.noticed, since);
     }
     if (answer.answer != Answer::valid) return;
+    if (answer.status == NavigationStatus::lost) {
+      EXPECT_FALSE(answer.scale_valid || answer.direction_valid) << t;
+    }
     const auto error = evaluation::score(
         {at(t - 0.1), at(t), answer.motion, answer.scale_valid, answer.direction_valid}, clean.truth);
     if (!error || since < 0) return;
@@ -107,14 +110,16 @@ TEST_P(GyroscopeSteps, AreNoticedAndOvercome) {
   const auto [axis, size] = GetParam();
   const bool yaw = axis == 2;
   const Outcome outcome = fly(inertial_fault(size * Vector3d::Unit(axis), Vector3d::Zero()), yaw ? 5 : 0);
-  EXPECT_LT(outcome.noticed, yaw ? 15 : 3.05);
+  const bool slow = std::abs(size) < 0.02;  // no innovation leaves its gate: their drift tells
+  EXPECT_LT(outcome.noticed, yaw ? 15 : slow ? 8 : 3.05);
   EXPECT_LT(outcome.nees, 5);
   EXPECT_GT(outcome.valid, 0.5) << "and then its answers are of use again";
   EXPECT_GE(outcome.health.times_lost, 1U);
 }
 INSTANTIATE_TEST_SUITE_P(Axes, GyroscopeSteps,
-                         testing::Values(std::pair{0, 0.02}, std::pair{0, -0.05}, std::pair{1, 0.02},
-                                         std::pair{1, 0.1}, std::pair{2, 0.02}, std::pair{2, -0.05}));
+                         testing::Values(std::pair{0, 0.008}, std::pair{0, 0.02}, std::pair{0, -0.05},
+                                         std::pair{1, 0.02}, std::pair{1, 0.1}, std::pair{2, 0.02},
+                                         std::pair{2, -0.05}));
 
 TEST(Faults, StepsOfAnAccelerometerAreNoticedAndOvercome) {
   for (int axis = 0; axis < 3; ++axis) {

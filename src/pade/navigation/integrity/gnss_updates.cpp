@@ -20,7 +20,7 @@ constexpr double kDoubtedSpeed = 1;       // m/s; doubted velocities may have le
 constexpr double kOpenedTilt = 0.03;  // rad
 constexpr double kOpenedRate = 0.02;  // rad/s
 constexpr double kOpenedForce = 0.2;  // m/s²
-constexpr int kMostDoublings = 4;
+constexpr int kMostDoublings = 3;
 
 /// A covariance with each axis at or above the floor; nothing if it is not a covariance.
 Matrix3d floored(const Matrix3d& covariance, double floor) {
@@ -36,6 +36,19 @@ bool used(const Innovation& innovation) {
 /// What a sensor shows while nothing is wrong.
 bool usual(const Innovation& innovation, bool lost) {
   return innovation.verdict == Verdict::accepted && !lost;
+}
+
+/// Whether the velocities that are being rejected are right, and the filter is wrong.
+bool velocities_are_right(const FilterCore& core, const FilterOptions& options) {
+  const Integrity& integrity = core.integrity;
+  const Time now = core.state.time;
+  if (integrity.velocity_doubted) return false;
+  // What has drifted to the gate is the filter; velocities that are wrong are so at once.
+  if (core.velocity_rejections == 1 && integrity.velocity.drift() > options.drift_bound) return true;
+  const double silence = seconds_between(core.velocity_accepted, now);
+  if (silence < options.reacquire_after || core.velocity_rejections < kLeastRejections) return false;
+  return !integrity.watching || integrity.velocity_refuses_wait || !integrity.dispute.can_rule(now) ||
+         silence >= kNoRuling;
 }
 
 }  // namespace
@@ -132,15 +145,7 @@ Innovation Filter::update(const GnssVelocity& velocity) {
   }
   if (innovation.verdict == Verdict::rejected) {
     ++core_.velocity_rejections;
-    const double silence = seconds_between(core_.velocity_accepted, now);
-    // What has drifted to the gate is the filter; velocities that are wrong are so at once.
-    const bool drifted = core_.velocity_rejections == 1 && integrity.velocity.drift() > options_.drift_bound;
-    if (drifted) integrity.velocity_refuses_wait = true;
-    const bool waited =
-        drifted || (silence >= options_.reacquire_after && core_.velocity_rejections >= kLeastRejections);
-    const bool ruled = !integrity.watching || integrity.velocity_refuses_wait ||
-                       !integrity.dispute.can_rule(now) || silence >= kNoRuling;
-    if (waited && ruled && !integrity.velocity_doubted) {
+    if (velocities_are_right(core_, options_)) {
       if (integrity.watching && core_.velocity_seen) open_inertial();
       innovation = believe_velocity(prediction, residual, noise);
     }
@@ -238,9 +243,11 @@ void Filter::judge_azimuth(InnovationWindow& window, const Innovation& innovatio
   window.add(innovation.white, now, usual(innovation, integrity.lost) && window.drift() < kLearnable);
   if (window.drift() > kOfOneComponent * options_.drift_bound) {
     // What the yaw did to the horizon in the meantime is not known either.
-    const Time by_velocities = integrity.last_opening;
+    const Integrity before = integrity;
     open_inertial();
-    integrity.last_opening = by_velocities;
+    // A magnetometer near iron must not make the filter give itself up.
+    integrity.last_opening = before.last_opening;
+    integrity.openings = std::max(before.openings, std::min(integrity.openings, 2));
     const Vector3d up = core_.state.X.R.conjugate() * Vector3d::UnitZ();
     const double turn = innovation.residual.x();
     P_.block<3, 3>(kPhi, kPhi) += turn * turn * up * up.transpose();

@@ -10,6 +10,7 @@ constexpr double kFixAge = 1.5;       // s, for which a position can still rule
 constexpr double kRulingSigmas = 4;   // between the two ways, of the difference of two positions
 constexpr double kSettled = 3;        // s without an alarm
 constexpr double kCalm = 9;           // of the mean square of three innovations; 3 is expected
+constexpr int kMostOpenings = 3;      // in a row; then the errors are beyond what is linear
 constexpr double kHopeless = 10;      // s
 constexpr double kFastAverage = 1.5;  // s
 constexpr double kSlowAverage = 7.5;  // s
@@ -122,7 +123,9 @@ void Integrity::settle(Time now) {
 }
 
 bool Integrity::hopeless(Time now) const {
-  if (!lost || position_doubted || seconds_between(lost_since, now) < kHopeless) return false;
+  if (!lost || position_doubted) return false;
+  if (!velocity_doubted && openings > kMostOpenings) return true;
+  if (seconds_between(lost_since, now) < kHopeless) return false;
   if (velocity_doubted) return !calm(position, now);
   // A new start is for what velocities and inertial sensors make of each other; a magnetometer or positions
   // that are led astray are no reason.
