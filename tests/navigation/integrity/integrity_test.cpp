@@ -117,6 +117,18 @@ TEST(GnssAgreement, TellsPositionsThatLeaveTheVelocities) {
   }
 }
 
+TEST(GnssAgreement, OutliersAreNoDrift) {
+  Random random(6);
+  GnssAgreement agreement;
+  for (int i = 0; i < 5 * 600; ++i) {
+    agreement.velocity(0.05 * random.normal3(), at(0.2 * i));
+    const double noise = random.uniform() < 0.1 ? 20 : 0.25;
+    agreement.position(noise * random.normal3(), Vector3d::Constant(0.25), Vector3d::Constant(0.13),
+                       at(0.2 * i));
+    ASSERT_FALSE(agreement.contradicts()) << i;
+  }
+}
+
 TEST(GnssAgreement, AJumpIsNoDriftButJumpsInOneDirectionAre) {
   for (const bool back : {true, false}) {
     GnssAgreement agreement;

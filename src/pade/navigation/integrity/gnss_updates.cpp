@@ -38,13 +38,21 @@ bool usual(const Innovation& innovation, bool lost) {
   return innovation.verdict == Verdict::accepted && !lost;
 }
 
+/// What counts of an innovation: of one that is rejected alone less, for it may be an outlier.
+Vector3d counted(const Innovation& innovation, int rejections_before) {
+  constexpr double kAlone = 2.5;
+  const double norm = innovation.white.norm();
+  const bool alone = innovation.verdict == Verdict::rejected && rejections_before == 0 && norm > kAlone;
+  return alone ? Vector3d(innovation.white * (kAlone / norm)) : innovation.white;
+}
+
 /// Whether the velocities that are being rejected are right, and the filter is wrong.
 bool velocities_are_right(const FilterCore& core, const FilterOptions& options) {
   const Integrity& integrity = core.integrity;
   const Time now = core.state.time;
   if (integrity.velocity_doubted) return false;
   // What has drifted to the gate is the filter; velocities that are wrong are so at once.
-  if (core.velocity_rejections == 1 && integrity.velocity.drift() > options.drift_bound) return true;
+  if (core.velocity_rejections <= 2 && integrity.velocity.drift() > options.drift_bound) return true;
   const double silence = seconds_between(core.velocity_accepted, now);
   if (silence < options.reacquire_after || core.velocity_rejections < kLeastRejections) return false;
   return !integrity.watching || integrity.velocity_refuses_wait || !integrity.dispute.can_rule(now) ||
@@ -141,7 +149,8 @@ Innovation Filter::update(const GnssVelocity& velocity) {
   const double gate = integrity.velocity_doubted ? 0 : options_.gate_probability_3;
   Innovation innovation = correct<3>(prediction, residual, noise, gate);
   if (integrity.watching && innovation.verdict != Verdict::unusable) {
-    integrity.velocity.add(innovation.white, now, usual(innovation, integrity.lost));
+    integrity.velocity.add(counted(innovation, core_.velocity_rejections), now,
+                           usual(innovation, integrity.lost));
   }
   if (innovation.verdict == Verdict::rejected) {
     ++core_.velocity_rejections;
@@ -230,7 +239,8 @@ void Filter::judge_position(const Innovation& innovation) {
   if (!integrity.watching || innovation.verdict == Verdict::unusable) return;
   const Time now = core_.state.time;
   if (integrity.position_doubted) return integrity.settle(now);
-  integrity.position.add(innovation.white, now, usual(innovation, integrity.lost));
+  integrity.position.add(counted(innovation, core_.position_rejections - 1), now,
+                         usual(innovation, integrity.lost));
   if (integrity.position.drift() > options_.drift_bound) integrity.raise(now);
   integrity.settle(now);
 }

@@ -17,6 +17,7 @@ constexpr double kSlowAverage = 7.5;  // s
 constexpr int kLeastPositions = 5;
 constexpr double kClockDoubt = 0.05;  // s, by which stamps of the two may differ
 constexpr double kSpeedMemory = 10;   // s
+constexpr double kOutlier = 4;        // sigmas
 constexpr double kLeastDoubt = 0.05;  // m
 constexpr double kAgreementRatio = 3;
 constexpr double kShiftsApart = 8;      // s; jumps farther apart have nothing to do with each other
@@ -57,9 +58,14 @@ Dispute::Ruling Dispute::position(const Vector3d& measured, double white_sigma, 
     return Ruling::none;
   }
   const Vector3d between = way_measured_ - way_predicted_;
-  if (between.norm() < kRulingSigmas * std::sqrt(2.0) * white_sigma) return Ruling::none;
-  const double share = (measured - fix_ - way_predicted_).dot(between) / between.squaredNorm();
-  return share > 0.5 ? Ruling::filter_wrong : Ruling::velocity_wrong;
+  const double noise = kRulingSigmas * std::sqrt(2.0) * white_sigma;
+  if (between.norm() < noise) return Ruling::none;
+  const Vector3d beside_filter = measured - fix_ - way_predicted_;
+  const bool filter_wrong = beside_filter.dot(between) > 0.5 * between.squaredNorm();
+  // A position that lies on neither way is an outlier, or the first one was.
+  const double miss = (filter_wrong ? Vector3d(beside_filter - between) : beside_filter).norm();
+  if (miss > std::max(noise, 0.5 * between.norm())) return Ruling::none;
+  return filter_wrong ? Ruling::filter_wrong : Ruling::velocity_wrong;
 }
 
 bool Dispute::can_rule(Time now) const { return has_fix_ && seconds_between(fix_time_, now) < kFixAge; }
@@ -83,10 +89,17 @@ void GnssAgreement::position(const Vector3d& measured, const Vector3d& white, co
     fast_ = slow_ = apart;
     agrees_since_ = now;
   }
-  fast_ += (1 - std::exp(-dt / kFastAverage)) * (apart - fast_);
-  slow_ += (1 - std::exp(-dt / kSlowAverage)) * (apart - slow_);
   const double averaged = std::min(1.0, dt / (2 * kFastAverage));
   const double doubt = kLeastDoubt + kClockDoubt * fastest_;
+  // An outlier moves the averages no more than a bad position would.
+  const double largest = kOutlier * (white.norm() + doubt);
+  const auto follow = [&](Vector3d& average, double time) {
+    const Vector3d step = apart - average;
+    const double size = step.norm();
+    average += (1 - std::exp(-dt / time)) * (size > largest ? Vector3d(step * (largest / size)) : step);
+  };
+  follow(fast_, kFastAverage);
+  follow(slow_, kSlowAverage);
   const Vector3d variance = averaged * white.cwiseAbs2() + (kSlowAverage - kFastAverage) * walk.cwiseAbs2() +
                             Vector3d::Constant(doubt * doubt);
   ratio_ = positions_ < kLeastPositions ? 0 : (fast_ - slow_).cwiseQuotient(variance.cwiseSqrt()).norm();
