@@ -1,4 +1,5 @@
 // `pade navigate`: a log of IMU and GNSS through the navigation filter.
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <numbers>
@@ -105,6 +106,12 @@ Result<NavigationRunOptions> run_options(const NavigateArguments& arguments, con
 
 using Score = std::optional<evaluation::MotionSummary>;
 
+std::size_t frames_lost(const NavigationRun& run) {
+  return static_cast<std::size_t>(std::count_if(
+      run.frames.begin(), run.frames.end(),
+      [](const NavigationFrame& frame) { return frame.status == navigation::NavigationStatus::lost; }));
+}
+
 nlohmann::json summary(const NavigationRun& run, const Score& score, const std::vector<Hint>& hints) {
   nlohmann::json sensors = nlohmann::json::array();
   for (const auto& sensor : run.sensors) {
@@ -129,6 +136,10 @@ nlohmann::json summary(const NavigationRun& run, const Score& score, const std::
                          {"measurements_repeated", run.health.duplicates},
                          {"measurements_unusable", run.health.unusable},
                          {"restarts", run.health.restarts},
+                         {"restarts_when_lost", run.health.restarts_when_lost},
+                         {"times_lost", run.health.times_lost},
+                         {"velocity_doubted", run.health.velocity_doubted},
+                         {"frames_lost", frames_lost(run)},
                          {"sensors", std::move(sensors)},
                          {"hints", std::move(list)}};
   if (score) {
@@ -181,8 +192,8 @@ Status navigate(const NavigateArguments& arguments) {
   }
   fmt::print("{}", evaluation::to_table(hints));
   for (const std::string& remark : log->remarks) fmt::print("{}\n", remark);
-  fmt::print("{} frames, {} without a pose; status at the end: {}\n", run.frames.size(),
-             run.frames_without_answer, to_name(run.health.status));
+  fmt::print("{} frames, {} of them lost, {} without a pose; status at the end: {}\n", run.frames.size(),
+             frames_lost(run), run.frames_without_answer, to_name(run.health.status));
   for (const auto& sensor : run.sensors) {
     fmt::print("{}: {} measurements, {} refused, mean χ² {:.2f} per component (1 is consistent)\n",
                sensor.sensor, sensor.measurements, sensor.refused, sensor.chi_square);

@@ -188,6 +188,19 @@ TEST(RunCheck, SaysThatABarometerIsRefusedForEver) {
   EXPECT_THAT(hints, has("sensor-refused"));
 }
 
+TEST(RunCheck, SaysThatTheFilterWasLostAndWhy) {
+  Health health;
+  health.times_lost = 2;
+  health.restarts = health.restarts_when_lost = 1;
+  EXPECT_THAT(check_run({}, health, 1000), has("lost"));
+  EXPECT_THAT(check_run({}, health, 1000), Not(has("restarts"))) << "no gap was the reason";
+  ++health.restarts;
+  EXPECT_THAT(check_run({}, health, 1000), has("restarts"));
+  EXPECT_THAT(check_run({}, health, 1000), Not(has("velocity-doubted")));
+  health.velocity_doubted = 1;
+  EXPECT_THAT(check_run({}, health, 1000), has("velocity-doubted"));
+}
+
 TEST(RunCheck, HasNothingToSayOfAGoodRun) {
   const auto log = good();
   Health health;

@@ -12,16 +12,8 @@ constexpr double kVibrationTime = 1.0;         // over which the level of vibrat
 constexpr double kLargestRateVariance = 1;     // what is more is a fault, (rad/s)²
 constexpr double kLargestForceVariance = 400;  // (m/s²)²
 constexpr double kAxleDistance = 1.0;          // m
-constexpr int kLeastRejections = 3;            // in a row, before a sensor is believed against the filter
 
 double wrap_angle(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
-
-/// A covariance with each axis at or above the floor; nothing if it is not a covariance.
-Matrix3d floored(const Matrix3d& covariance, double floor) {
-  Matrix3d result = 0.5 * (covariance + covariance.transpose());
-  for (int i = 0; i < 3; ++i) result(i, i) = std::max(result(i, i), floor * floor);
-  return result;
-}
 
 /// White noise of each axis, unit²/Hz: the instrument's own and the share of vibration of the given variance.
 Vector3d noise_power(double density, double share, const Vector3d& variance, double interval) {
@@ -180,7 +172,8 @@ Innovation Filter::correct(const Prediction<M>& prediction, const Eigen::Matrix<
   innovation.sigma.template head<M>() = S.diagonal().cwiseSqrt();
   Eigen::LLT<Square> factor(S);
   if (factor.info() != Eigen::Success || !residual.allFinite()) return innovation;
-  innovation.chi_square = residual.dot(factor.solve(residual));
+  innovation.white.template head<M>() = factor.matrixL().solve(residual);
+  innovation.chi_square = innovation.white.squaredNorm();
   if (!std::isfinite(innovation.chi_square)) return innovation;
   innovation.log_likelihood =
       -0.5 * innovation.chi_square - factor.matrixLLT().diagonal().array().log().sum();
@@ -203,6 +196,8 @@ Innovation Filter::correct(const Prediction<M>& prediction, const Eigen::Matrix<
   return innovation;
 }
 
+template Innovation Filter::correct<3>(const Prediction<3>&, const Vector3d&, Matrix3d, double, bool);
+
 void Filter::apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1>& error) {
   const ExtendedPose before = core_.state.X;
   core_.state.retract(error.head<kBase>());
@@ -216,90 +211,6 @@ void Filter::apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 
   core_.smooth_position += before.p - core_.state.X.p;
   core_.smooth_rotation =
       rotation_log(Quaterniond(rotation_exp(core_.smooth_rotation) * before.R * core_.state.X.R.conjugate()));
-}
-
-Matrix3d Filter::split_position_noise(const GnssFix& fix) {
-  const Matrix3d total = floored(fix.covariance, options_.position_sigma_floor);
-  const double horizontal = std::sqrt(0.5 * (total(0, 0) + total(1, 1)));
-  const bool carrier = horizontal < options_.carrier_phase_limit;
-  const double share = carrier ? options_.carrier_phase_white_share : options_.single_point_white_share;
-  const double tau =
-      carrier ? options_.carrier_phase_correlation_time : options_.single_point_correlation_time;
-  const Vector3d sigma = ((1 - share) * total.diagonal()).cwiseSqrt();
-
-  GnssErrorClass& known = core_.gnss_class;
-  if (known.correlation_time != tau) {  // another kind of solution has another, independent bias
-    P_.middleCols<3>(kPositionBias).setZero();
-    P_.middleRows<3>(kPositionBias).setZero();
-    P_.diagonal().segment<3>(kPositionBias) = sigma.cwiseAbs2();
-    core_.state.position_bias.setZero();
-  } else {  // a receiver that announces a larger error has one now, not in two minutes
-    const Vector3d grown = (sigma.cwiseAbs2() - known.bias_sigma.cwiseAbs2()).cwiseMax(0);
-    P_.diagonal().segment<3>(kPositionBias) += grown;
-  }
-  known = {sigma, tau};
-  return share * total;
-}
-
-void Filter::shift_common_position(const Matrix3d& covariance) {
-  // A common shift δ of the world moves every ρ by R^T δ and leaves all relative motion as it is.
-  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMaxState, 3> G = decltype(G)::Zero(size(), 3);
-  G.middleRows<3>(kRho) = core_.state.X.R.toRotationMatrix().transpose();
-  for (int i = 0; i < clones_; ++i) {
-    G.middleRows<3>(kBase + 6 * i + 3) = clone_poses_[static_cast<std::size_t>(i)].matrix3().transpose();
-  }
-  P_ += G * covariance * G.transpose();
-}
-
-Innovation Filter::update(const GnssFix& fix) {
-  if (!fix.position.allFinite() || !fix.covariance.allFinite()) return {};
-  flush();
-  const Matrix3d white = split_position_noise(fix);
-  const Prediction<3> prediction = predict_gnss_position(core_.state, lever_arm_);
-  const Vector3d residual = fix.position - prediction.value;
-  Innovation innovation = correct<3>(prediction, residual, white, options_.gate_probability_3);
-  if (innovation.verdict == Verdict::rejected) {
-    ++core_.position_rejections;
-    const double silence = seconds_between(core_.position_accepted, core_.state.time);
-    if (silence >= options_.reacquire_after && core_.position_rejections >= kLeastRejections) {
-      const Vector3d before = core_.state.X.p;
-      shift_common_position(residual.cwiseAbs2().asDiagonal());
-      innovation = correct<3>(prediction, residual, white, options_.gate_probability_3, true);
-      innovation.verdict = Verdict::reacquired;
-      innovation.jump = (core_.state.X.p - before).norm();
-    }
-  }
-  if (innovation.verdict != Verdict::rejected && innovation.verdict != Verdict::unusable) {
-    core_.position_accepted = core_.state.time;
-    core_.position_rejections = 0;
-  }
-  return innovation;
-}
-
-Innovation Filter::update(const GnssVelocity& velocity) {
-  if (!velocity.velocity.allFinite() || !velocity.covariance.allFinite()) return {};
-  flush();
-  const Matrix3d noise = floored(velocity.covariance, options_.velocity_sigma_floor);
-  const Prediction<3> prediction = predict_gnss_velocity(core_.state, lever_arm_);
-  const Vector3d residual = velocity.velocity - prediction.value;
-  Innovation innovation = correct<3>(prediction, residual, noise, options_.gate_probability_3);
-  if (innovation.verdict == Verdict::rejected) {
-    ++core_.velocity_rejections;
-    const double silence = seconds_between(core_.velocity_accepted, core_.state.time);
-    if (silence >= options_.reacquire_after && core_.velocity_rejections >= kLeastRejections) {
-      const Vector3d before = core_.state.X.v;
-      P_.diagonal().segment<3>(kNu).array() += residual.squaredNorm();
-      innovation = correct<3>(prediction, residual, noise, options_.gate_probability_3, true);
-      innovation.verdict = Verdict::reacquired;
-      innovation.jump = (core_.state.X.v - before).norm();
-    }
-  }
-  if (innovation.verdict != Verdict::rejected && innovation.verdict != Verdict::unusable) {
-    core_.velocity_accepted = core_.state.time;
-    core_.velocity_seen = true;
-    core_.velocity_rejections = 0;
-  }
-  return innovation;
 }
 
 Innovation Filter::update(const ZeroVelocity& stop) {
@@ -333,8 +244,10 @@ Innovation Filter::update(const Heading& heading) {
   if (!prediction || !std::isfinite(heading.yaw) || !std::isfinite(heading.sigma)) return {};
   const Eigen::Matrix<double, 1, 1> residual(wrap_angle(heading.yaw - prediction->value[0]));
   const double sigma = std::max(heading.sigma, 1e-3);
-  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
-                    options_.gate_probability_1);
+  const Innovation innovation = correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
+                                           options_.gate_probability_1);
+  judge_azimuth(core_.integrity.heading, innovation);
+  return innovation;
 }
 
 Innovation Filter::update(const MagneticField& field, double declination) {
@@ -348,8 +261,10 @@ Innovation Filter::update(const MagneticField& field, double declination) {
   // The azimuth hangs on the horizontal part of the field alone: the field's error moves it as the iron does.
   const double lever = prediction->H.middleCols<3>(kIron).norm();
   const double sigma = lever * std::max(field.sigma, 1e-3);
-  return correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
-                    options_.gate_probability_1);
+  const Innovation innovation = correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
+                                           options_.gate_probability_1);
+  judge_azimuth(core_.integrity.magnetometer, innovation);
+  return innovation;
 }
 
 Innovation Filter::update(const RangeToGround& range) {

@@ -12,6 +12,7 @@
 #include "pade/navigation/filter_options.hpp"
 #include "pade/navigation/filter_state.hpp"
 #include "pade/navigation/imu_increment.hpp"
+#include "pade/navigation/integrity/integrity.hpp"
 #include "pade/navigation/measurement.hpp"
 #include "pade/navigation/measurement_models.hpp"
 
@@ -54,6 +55,7 @@ struct FilterCore {
   double log_likelihood = 0;    ///< of all GNSS innovations since the start, bounded per innovation
   int position_rejections = 0;  ///< in a row
   int velocity_rejections = 0;
+  Integrity integrity;
 };
 
 /// What is kept to come back to: everything but clones.
@@ -105,6 +107,9 @@ class Filter {
   /// Levelling: the mean specific force of a body known to be unaccelerated.
   Innovation update_static_force(const Vector3d& force, double sigma);
 
+  /// From now on the innovations are judged: `core().integrity` says whether the filter is lost.
+  void watch() { core_.integrity.watching = true; }
+
   /// Remembers the present pose; its index, or -1 where kMaxClones are taken.
   int clone();
   void drop_clones();
@@ -124,6 +129,15 @@ class Filter {
   /// White part of the fix's covariance; follows the receiver from one error class to another.
   Matrix3d split_position_noise(const GnssFix& fix);
   void shift_common_position(const Matrix3d& covariance);
+  Innovation believe_velocity(const Prediction<3>& prediction, const Vector3d& residual,
+                              const Matrix3d& noise);
+  void judge_velocity(const Innovation& innovation);
+  void judge_position(const Innovation& innovation);
+  void judge_azimuth(InnovationWindow& window, const Innovation& innovation);
+  void hear_dispute(Dispute::Ruling ruling);
+  void compare_gnss(const Vector3d& position, const Matrix3d& white);
+  void doubt_velocity();
+  void open_inertial();
   template <int M>
   Innovation correct(const Prediction<M>& prediction, const Eigen::Matrix<double, M, 1>& residual,
                      Eigen::Matrix<double, M, M> noise, double gate, bool force = false);

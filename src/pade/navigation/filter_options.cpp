@@ -49,6 +49,7 @@ Status check(const FilterOptions& o) {
       {"gate_probability_1", o.gate_probability_1, above_zero},
       {"soft_gate", o.soft_gate, 1},
       {"reacquire_after", o.reacquire_after, 0},
+      {"drift_bound", o.drift_bound, above_zero},
   };
   return check_ranges(ranges);
 }

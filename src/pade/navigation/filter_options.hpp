@@ -56,6 +56,7 @@ struct FilterOptions {
   double gate_probability_1 = 10.83;  ///< of 1 degree of freedom
   double soft_gate = 3;  ///< up to this multiple of the bound a measurement is kept with inflated noise
   double reacquire_after = 1.0;  ///< seconds of nothing but rejections after which the sensor is believed
+  double drift_bound = 42;       ///< of the drift of innovations, beyond which the covariance is refuted
 
   static FilterOptions of(ImuClass imu);
 
@@ -94,6 +95,8 @@ struct FilterOptions {
     field("gate_probability_1", self.gate_probability_1, "chi-square gate, 1 degree of freedom");
     field("soft_gate", self.soft_gate, "multiple of the gate up to which noise is inflated instead");
     field("reacquire_after", self.reacquire_after, "seconds of rejections before a sensor is believed again");
+    field("drift_bound", self.drift_bound,
+          "chi-square of the drift of innovations that refutes the covariance");
   }
 };
 

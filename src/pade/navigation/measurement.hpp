@@ -24,6 +24,7 @@ struct Innovation {
   int size = 0;
   Vector3d residual = Vector3d::Zero();
   Vector3d sigma = Vector3d::Zero();  ///< predicted, before any inflation
+  Vector3d white = Vector3d::Zero();  ///< the residual in units of its predicted covariance, S^(-1/2) r
   double chi_square = 0;
   double log_likelihood = 0;  ///< of the residual under its predicted covariance, without the constant
   double jump = 0;  ///< distance the position (or speed the velocity) moved in a re-acquisition, m or m/s

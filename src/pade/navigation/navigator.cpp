@@ -70,6 +70,7 @@ class Navigator::Core {
 
   void advance_live(Time to);
   void restart();
+  void restart_if_hopeless();
   bool load_scratch(Time t, Answer& answer);
   [[nodiscard]] Time imu_time(Time image) const;
   [[nodiscard]] NavigationStatus status_of(Filter& filter) const;
@@ -84,6 +85,8 @@ class Navigator::Core {
   bool has_imu_ = false;
   Time newest_;
   Health health_;
+  std::uint64_t times_lost_before_ = 0;  ///< the last restart
+  std::uint64_t doubted_before_ = 0;
   std::function<void(const Measurement&)> sink_;
 };
 
@@ -99,11 +102,23 @@ Navigator::Core::Core(const NavigatorOptions& options)
 }
 
 void Navigator::Core::restart() {
+  if (phase_ == AlignmentPhase::aligned) {
+    times_lost_before_ += static_cast<std::uint64_t>(live_.core().integrity.times_lost);
+    doubted_before_ += static_cast<std::uint64_t>(live_.core().integrity.times_doubted);
+  }
   phase_ = AlignmentPhase::waiting;
   alignment_.reset();
   keyframes_.clear();
-  timeline_.imu.clear();
   ++health_.restarts;
+}
+
+void Navigator::Core::restart_if_hopeless() {
+  // As it was when all late data had come, so that a restart does not depend on delays.
+  const Time then = shifted(newest_, -options_.alignment.lag);
+  const std::size_t known = keyframes_.count_until(then);
+  if (known == 0 || !keyframes_[known - 1].snapshot.integrity.hopeless(then)) return;
+  restart();
+  ++health_.restarts_when_lost;
 }
 
 void Navigator::Core::add(const ImuSample& sample) {
@@ -115,17 +130,22 @@ void Navigator::Core::add(const ImuSample& sample) {
   if (has_imu_) {
     const double interval = seconds_between(newest_, sample.time);
     if (interval > options_.filter.gap) ++health_.imu_gaps;
-    if (interval > options_.longest_gap) restart();
+    if (interval > options_.longest_gap) {
+      restart();
+      timeline_.imu.clear();
+    }
   }
   has_imu_ = true;
   newest_ = sample.time;
   timeline_.imu.push_back(sample);
   if (phase_ == AlignmentPhase::aligned) {
     advance_live(newest_);
+    restart_if_hopeless();
   } else {
     phase_ = alignment_.update(timeline_, newest_);
     if (phase_ == AlignmentPhase::aligned) {
       live_ = alignment_.result();
+      live_.watch();
       keyframes_.clear();
       keyframes_.push_back({live_.state().time, live_.snapshot()});
       advance_live(newest_);
@@ -191,6 +211,7 @@ bool Navigator::Core::load_scratch(Time t, Answer& answer) {
 }
 
 NavigationStatus Navigator::Core::status_of(Filter& filter) const {
+  if (filter.core().integrity.lost) return NavigationStatus::lost;
   if (yaw_of(filter).sigma > kYawKnown) return NavigationStatus::levelled;
   const FilterCore& core = filter.core();
   if (!core.velocity_seen) return NavigationStatus::yaw_known;
@@ -227,9 +248,11 @@ RelativePose Navigator::Core::relative_pose(Time t1, Time t2, const Pose& T_body
   result.motion.covariance = turn * local * turn.transpose();
   const double baseline = T.translation.norm();
   const BaselineSigmas sigma = baseline_sigmas(T.translation, result.motion.covariance.topLeftCorner<3, 3>());
-  result.scale_valid = options_.scale_error_limit * baseline > options_.scale_error_sigmas * sigma.along;
+  const bool lost = scratch_.core().integrity.lost;  // then the covariance is refuted
+  result.scale_valid =
+      !lost && options_.scale_error_limit * baseline > options_.scale_error_sigmas * sigma.along;
   result.direction_valid =
-      options_.direction_error_limit * baseline > options_.direction_error_sigmas * sigma.across;
+      !lost && options_.direction_error_limit * baseline > options_.direction_error_sigmas * sigma.across;
   return result;
 }
 
@@ -253,6 +276,9 @@ Health Navigator::Core::health() {
   } else if (phase_ == AlignmentPhase::levelled) {
     health_.status = NavigationStatus::levelled;
   } else {
+    const Integrity& integrity = live_.core().integrity;
+    health_.times_lost = times_lost_before_ + static_cast<std::uint64_t>(integrity.times_lost);
+    health_.velocity_doubted = doubted_before_ + static_cast<std::uint64_t>(integrity.times_doubted);
     scratch_.restore(live_.snapshot());
     health_.status = status_of(scratch_);
     health_.yaw_sigma = yaw_of(scratch_).sigma;

@@ -35,7 +35,7 @@ struct NavigatorOptions {
   double dead_reckoning_after = 1;             ///< seconds without GNSS velocity
   double longest_gap = 3;                      ///< without IMU data; beyond it the filter starts anew, s
   double scale_error_limit = 0.2;              ///< of the baseline's length: the noise bound of the paper
-  double scale_error_sigmas = 2.5;      ///< `scale_valid` asks for limit * baseline > this * sigma along it
+  double scale_error_sigmas = 2.0;      ///< `scale_valid` asks for limit * baseline > this * sigma along it
   double direction_error_limit = 0.35;  ///< of the baseline's direction: what images can still mend, rad
   double direction_error_sigmas = 2.7;  ///< `direction_valid` asks for limit * baseline > this * sigma across
 
@@ -72,7 +72,8 @@ enum class NavigationStatus : std::uint8_t {
   levelled,   ///< attitude, and yaw with a standard deviation over 0.125 rad or not at all
   yaw_known,  ///< no GNSS velocity has confirmed it yet
   navigating,
-  dead_reckoning,  ///< no GNSS velocity for a while
+  dead_reckoning,  ///< no GNSS velocity for a while, or none that the positions do not contradict
+  lost,            ///< the measurements refute the covariance: nothing here is to be relied on
 };
 
 struct Health {
@@ -82,10 +83,13 @@ struct Health {
   double yaw_sigma = 0;           ///< rad
   std::uint64_t imu_refused = 0;  ///< not finite, or not later than the one before
   std::uint64_t imu_gaps = 0;
-  std::uint64_t too_late = 0;    ///< measurements older than the history
-  std::uint64_t duplicates = 0;  ///< same sensor, same stamp
-  std::uint64_t unusable = 0;    ///< not finite
-  std::uint64_t restarts = 0;    ///< after a gap too long to bridge
+  std::uint64_t too_late = 0;            ///< measurements older than the history
+  std::uint64_t duplicates = 0;          ///< same sensor, same stamp
+  std::uint64_t unusable = 0;            ///< not finite
+  std::uint64_t restarts = 0;            ///< after a gap too long to bridge, or when lost for too long
+  std::uint64_t restarts_when_lost = 0;  ///< of them, those of the second kind
+  std::uint64_t times_lost = 0;
+  std::uint64_t velocity_doubted = 0;  ///< times that the GNSS velocities contradicted the positions
 };
 
 /// The answer to a question that cannot always be answered.
@@ -165,5 +169,6 @@ struct pade::EnumNames<pade::navigation::NavigationStatus> {
       std::pair{Status::yaw_known, std::string_view("yaw_known")},
       std::pair{Status::navigating, std::string_view("navigating")},
       std::pair{Status::dead_reckoning, std::string_view("dead_reckoning")},
+      std::pair{Status::lost, std::string_view("lost")},
   };
 };

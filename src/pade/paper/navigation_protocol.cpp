@@ -110,6 +110,7 @@ NavigationFigures run_protocol(const NavigationLog& log, const navigation::Navig
       figures.yaw_error_end = yaw_error(estimate.T_world_body, truth->T_world_body);
     }
   });
+  figures.health = navigator.health();
   figures.short_pairs = evaluation::summarise(figures.short_errors);
   figures.long_pairs = evaluation::summarise(figures.long_errors);
   figures.velocity_rms = std::sqrt(sums.velocity / sums.count);

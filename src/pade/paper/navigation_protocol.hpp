@@ -36,6 +36,7 @@ struct NavigationFigures {
   Time aligned;                  ///< when the yaw was first known
   double yaw_error_aligned = 0;  ///< at that time, rad
   bool finite = true;            ///< no NaN anywhere
+  navigation::Health health;     ///< at the end
 };
 
 /// Runs the filter over the log and scores it against log.truth.

@@ -52,7 +52,9 @@ std::vector<SensorSummary> summarise(std::span<const Measurement> measurements);
 ///   imu-refused        IMU samples that could not be used
 ///   sensor-refused     most of a sensor refused (a barometer for ever)
 ///   inconsistent       a sensor disagrees with the filter far beyond its sigma
-///   restarts           the filter had to start anew
+///   restarts           the filter had to start anew after a gap
+///   lost               the innovations refuted the covariance for a while
+///   velocity-doubted   velocities of the GNSS that its positions contradict were left out
 std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health& health,
                             std::size_t imu_samples);
 
