@@ -22,12 +22,14 @@ set(pade_public_headers
   navigation/measurement.hpp
   navigation/navigator.hpp
   flow/flow_estimator.hpp
+  flow/epipolar/multi_view.hpp
   depth/depth_estimator.hpp
   depth/depth_options.hpp
   depth/derotation.hpp
   depth/edges.hpp
   depth/focus_of_expansion.hpp
   depth/motion_refinement.hpp
+  depth/multi_view/views_depth.hpp
   mapping/occupancy_map.hpp
   io/atomic_output.hpp
   io/formats/map_files.hpp

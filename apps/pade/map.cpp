@@ -1,8 +1,11 @@
 // `pade map`: a recorded flight in, depth and an obstacle map out.
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
@@ -20,7 +23,37 @@
 #include "progress.hpp"
 
 namespace pade::cli {
+
+/// Which frames a depth image is made from, and how.
+enum class DepthFrom { multi_view, two_view, pade, ttc };
+
+}  // namespace pade::cli
+
+template <>
+struct pade::EnumNames<pade::cli::DepthFrom> {
+  static constexpr std::array names = {
+      std::pair{pade::cli::DepthFrom::multi_view, std::string_view("multi-view")},
+      std::pair{pade::cli::DepthFrom::two_view, std::string_view("two-view")},
+      std::pair{pade::cli::DepthFrom::pade, std::string_view("pade")},
+      std::pair{pade::cli::DepthFrom::ttc, std::string_view("ttc")}};
+};
+
+namespace pade::cli {
 namespace {
+
+void choose_depth(DepthFrom from, ObstacleMapperOptions& mapper) {
+  switch (from) {
+    case DepthFrom::multi_view:
+      return;
+    case DepthFrom::two_view:
+      mapper.views.count = 0;
+      return;
+    case DepthFrom::pade:
+    case DepthFrom::ttc:
+      mapper = one_pair(mapper);
+      mapper.depth.method = from == DepthFrom::ttc ? depth::Method::ttc : depth::Method::pade;
+  }
+}
 
 struct MapArguments {
   std::string sequence;
@@ -37,7 +70,7 @@ struct MapArguments {
   int threads = 1;
 
   std::optional<std::string> flow, poses, calibration, world_up, origin, refine_motion;
-  std::optional<depth::Method> method;
+  std::optional<DepthFrom> depth;
   std::optional<depth::Model> model;
   std::optional<depth::Reading> reading;
   std::optional<depth::Derotation> derotate;
@@ -64,7 +97,7 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   }
   ObstacleMapperOptions& mapper = options.mapper;
   set(mapper.flow, arguments.flow);
-  set(mapper.depth.method, arguments.method);
+  if (arguments.depth) choose_depth(*arguments.depth, mapper);
   set(mapper.depth.model, arguments.model);
   set(mapper.depth.reading, arguments.reading);
   set(mapper.depth.gates, arguments.gates);
@@ -175,8 +208,11 @@ void add_pipeline_options(CLI::App& map, MapArguments& a) {
   methods.emplace_back("dis");
   map.add_option("--flow", a.flow, "optical-flow method (default clg-fast-half); dis = dis-medium")
       ->check(CLI::IsMember(methods));
-  add_enum(map, "--depth", a.method,
-           "depth from the pose (pade, the default) or from time to collision (ttc)");
+  add_enum(
+      map, "--depth", a.depth,
+      "from the frames of the last seconds (multi-view, the default), from pairs of frames with refined\n"
+      "motion, checks and bounds (two-view: about half the time), or from one pair as in the paper: with "
+      "the\npose (pade) or by time to collision (ttc)");
   add_enum(map, "--model", a.model,
            "finite motion (exact, the default) or Eq. 1 of the paper (instantaneous)");
   add_enum(map, "--reading", a.reading, "how Eq. 2 is inverted (default least-squares)");

@@ -45,7 +45,9 @@ struct ViewsOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("count", self.count, "views that a frame is compared with at once; 0 = only the pair (two-view)");
+    field("count", self.count,
+          "views that a frame is compared with at once; 0 = only the pair (two-view), as with order first, "
+          "derotate flow, window > 1 or gates off");
     field("frames", self.frames, "the oldest of them is at most this many frames old");
     field("flow", self.flow, "their common parallax");
     field("depth", self.depth, "depth from it");
