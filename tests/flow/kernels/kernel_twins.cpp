@@ -324,6 +324,7 @@ std::vector<TwinResult> run_kernel_twins(simd::InstructionSet set) {
   confidence_twin(twins, set, images);
   clg_twins(twins, set, images);
   epipolar_twins(twins, set, images);
+  multi_view_twins(twins, set, images);
   return std::move(twins.results);
 }
 

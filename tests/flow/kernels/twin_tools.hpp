@@ -143,5 +143,6 @@ struct Images {
 
 void clg_twins(Twins& twins, simd::InstructionSet set, Images& m);
 void epipolar_twins(Twins& twins, simd::InstructionSet set, Images& m);
+void multi_view_twins(Twins& twins, simd::InstructionSet set, Images& m);
 
 }  // namespace pade::flow::testing
