@@ -267,6 +267,36 @@ TEST(ObstacleMapper, ASecondLongerBaselineIsMorePrecise) {
   EXPECT_LT(two, 0.7 * one);
 }
 
+TEST(ObstacleMapper, TheFramesBeforeMakeItMorePreciseStill) {
+  const ForwardFlight& f = forward();
+  const auto last = [&](const ObstacleMapperOptions& options) {
+    auto m = std::move(ObstacleMapper::create(f.scene.camera, options)).value();
+    const MapperUpdate* update = nullptr;
+    for (std::size_t k = 0; k < f.images.size(); ++k)
+      update = &m.add(f.images[k], f.scene.times[k], f.scene.T_world_camera[k]);
+    return f.error(update->depth);
+  };
+  ObstacleMapperOptions two_view;
+  two_view.views.count = 0;
+  EXPECT_LT(last({}), 0.8 * last(two_view));
+}
+
+/// Without a baseline there are no views, and what was found before is not taken for what is seen now.
+TEST(ObstacleMapper, HoverMeasuresNothingAndTheFlightGoesOn) {
+  const ForwardFlight& f = forward();
+  auto m = std::move(ObstacleMapper::create(f.scene.camera)).value();
+  std::size_t k = 0;
+  for (; k < 3; ++k) m.add(f.images[k], f.scene.times[k], f.scene.T_world_camera[k]);
+  Time time = f.scene.times[2];
+  for (int i = 0; i < 20; ++i) {
+    time.nanoseconds += 10000000;
+    const MapperUpdate& update = m.add(f.images[2], time, f.scene.T_world_camera[2]);
+    ASSERT_EQ(update.outcome, MapperUpdate::Outcome::mapped);
+    if (i < 17) continue;  // all frames that are kept are from one place
+    EXPECT_EQ(cv::countNonZero(update.depth.state == static_cast<int>(DepthState::measured)), 0);
+  }
+}
+
 TEST(ObstacleMapper, OnePairIsWhatThePaperKnows) {
   const ForwardFlight& f = forward();
   const ObstacleMapperOptions options = one_pair();
@@ -347,6 +377,11 @@ TEST(ObstacleMapper, RefusesWhatMakesNoSenseByName) {
            {"refinement.pixels", [](auto& o) { o.refinement.pixels = -5; }},
            {"edges.radius", [](auto& o) { o.edges.radius = 1000000; }},
            {"edges.nearness", [&](auto& o) { o.edges.nearness = nan; }},
+           {"views.count", [](auto& o) { o.views.count = 99; }},
+           {"views.frames", [](auto& o) { o.views.frames = 0; }},
+           {"views.flow.alpha", [&](auto& o) { o.views.flow.alpha = nan; }},
+           {"views.flow.largest_scale", [](auto& o) { o.views.flow.largest_scale = 0.5; }},
+           {"views.depth.sigma_scale", [](auto& o) { o.views.depth.sigma_scale = 0; }},
            {"bound_sigmas", [&](auto& o) { o.depth.bound_sigmas = nan; }},
            {"flow_sigma_scale", [](auto& o) { o.depth.flow_sigma_scale = -1; }},
            {"flow_relative_sigma", [](auto& o) { o.depth.flow_relative_sigma = -1; }}}) {
