@@ -178,7 +178,7 @@ void evidence_twins(Twins& twins, simd::InstructionSet set, Images& m, const Pla
     const double noise2 = 2 * kNoise * kNoise;
     const bool bad = left - noise2 > (0.1 + 0.5 / (1 + moved)) * (2 * gg + noise2);
     const bool seen = inside(s.x, s.y) && ex * ex + ey * ey > 0;
-    const bool texture = aa > 1.5 * kNoise * kNoise * (ex * ex + ey * ey);
+    const bool texture = aa > 1.5 * std::max(left / 2, 0.09) * (ex * ex + ey * ey);
     const double variance = std::max(rr - r * r, kNoise * kNoise);
     return Verdict{seen && !bad && texture ? kEffectiveSize * aa / variance : 0, aa > 0 ? -ar / aa : 0,
                    seen && !bad, seen && bad};
