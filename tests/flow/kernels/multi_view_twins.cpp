@@ -132,6 +132,7 @@ void evidence_twins(Twins& twins, simd::InstructionSet set, Images& m, const Pla
   e.taps = m.k.data();
   e.radius = kRadius;
   e.noise = static_cast<float>(kNoise);
+  e.image_noise = 0.3F;
   e.effective_size = static_cast<float>(kEffectiveSize);
   const Strip strip = [&](int a, int b) {
     PADE_DISPATCH(view_evidence, set)(e, true, a, b, m.scratch.data());

@@ -22,6 +22,7 @@ constexpr int kWindowRadius = 3;
 constexpr double kTensorSigma = 0.4;
 constexpr int kTensorRadius = 1;
 constexpr float kGreyNoise = 1;
+constexpr float kRounding = 0.3F;  // grey values
 constexpr int kCostWindow = 3;
 constexpr float kClearly = 0.25F;  // grey values
 constexpr float kUnseen = 1e3F;    // cost where no view sees a pixel
@@ -240,6 +241,7 @@ ParallaxField MultiViewEstimator::estimate(const cv::Mat& reference, const std::
   evidence.taps = b.window.data();
   evidence.radius = kWindowRadius;
   evidence.noise = std::max(kGreyNoise, static_cast<float>(noise));
+  evidence.image_noise = std::max(kRounding, static_cast<float>(noise));
   evidence.effective_size = static_cast<float>(effective_window(b.window));
   for (std::size_t i = 0; i < views.size(); ++i) {
     evidence.second = b.views[i].levels[0].view();

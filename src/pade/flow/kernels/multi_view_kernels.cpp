@@ -19,8 +19,7 @@ constexpr float kSlack = 0.5F;
 constexpr float kNoiseGradients = 2.0F;
 // Squared slopes, per grey^2 of noise, that are no texture: noise alone makes 0.9.
 constexpr float kSlopeNoise = 1.5F;
-constexpr float kLeastNoise = 0.3F;  // grey values: rounding alone
-constexpr float kTruncated = 20;     // grey values: farther off is as wrong
+constexpr float kTruncated = 20;  // grey values: farther off is as wrong
 constexpr int kChannels = 6;
 constexpr int kMatchedRows = 3;
 
@@ -209,8 +208,8 @@ void view_evidence(const ViewEvidence& e, bool reset, int first, int last, float
             const I good = at.inside & ~bad;
             const V ex = load(e.line.direction_x.row(y) + x);
             const V ey = load(e.line.direction_y.row(y) + x);
-            // Noise as the residual shows it, here.
-            const V here = max(sum[5] / kNoiseGradients, set(kLeastNoise * kLeastNoise));
+            // Noise of the image, or more where the residual shows more.
+            const V here = max(sum[5] / kNoiseGradients, set(e.image_noise * e.image_noise));
             const V of_noise = kSlopeNoise * here * (ex * ex + ey * ey);
             const I texture = I(sum[0] > of_noise);
             const V information = select(good & texture, e.effective_size * sum[0] / variance, V{});

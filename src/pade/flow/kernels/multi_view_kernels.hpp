@@ -33,7 +33,8 @@ struct ViewEvidence {
   PlaneView matching, wrong;  ///< numbers of views that match, and that do not
   const float* taps = nullptr;
   int radius = 0;
-  float noise = 1;
+  float noise = 1;        ///< of the residual's variance, grey values, at least
+  float image_noise = 0;  ///< of the image, as far as it is known
   float effective_size = 1;
 };
 
