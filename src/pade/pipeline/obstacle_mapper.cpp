@@ -418,7 +418,8 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   }
   cv::Mat start = depth::start_of_views(update_.depth, pair.flow.vectors, camera_, pair.motion,
                                         newest.T_world_camera, found_, baseline, options_.views.depth);
-  const ParallaxField field = views_.estimate(newest.image, views, start * scale);
+  const ParallaxField field =
+      views_.estimate(newest.image, views, start * scale, update_.diagnostics.image_noise);
   depth::read_views(field, scale, options_.depth, options_.views.depth, update_.depth);
   found_ = {newest.T_world_camera, field.distance * (1 / scale)};
 }
