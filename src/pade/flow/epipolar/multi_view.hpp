@@ -73,7 +73,8 @@ class MultiViewEstimator {
 
   /// @param reference  CV_8UC1. @param views  of its size.
   /// @param initial    CV_32FC1, d to start from; NaN = 0.
-  /// @param noise  standard deviation of the grey values, where it is known; at least 1 is assumed.
+  /// @param noise  standard deviation of the grey values, where it is known. Residuals count with 1 at least,
+  /// texture has to exceed 0.3 at least, and what the residual shows on the spot.
   /// @return empty where there is no view, or sizes or types do not fit.
   ParallaxField estimate(const cv::Mat& reference, const std::vector<View>& views, const cv::Mat& initial,
                          double noise = 0);
