@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "pade/core/random.hpp"
@@ -30,6 +31,10 @@ Time at(double seconds) { return Time::from_seconds(seconds); }
 double yaw_of(const TrueState& truth) {
   const Vector3d x = truth.T_world_body.rotation * Vector3d::UnitX();
   return std::atan2(x.y(), x.x());
+}
+
+std::string named(const char* sensor, int axis, double size) {
+  return fmt::format("{} {} {:.3g}", sensor, "xyz"[axis], size);
 }
 
 /// What is added to the measurements from `kFault` on.
@@ -144,7 +149,7 @@ TEST_P(Faults, OfTheGyroscopeAreNoticedAndOvercome) {
       Fault fault;
       fault.rate[axis] = size;
       fault.headings = axis == 2;
-      fault.name = std::string("gyroscope ") + "xyz"[axis] + " " + std::to_string(size).substr(0, 5);
+      fault.name = named("gyroscope", axis, size);
       const Outcome outcome = shown(fault);
       EXPECT_LT(outcome.noticed, axis == 2 ? 15 : 3.05) << fault.name;
       EXPECT_LT(outcome.nees, 5) << fault.name;
@@ -158,7 +163,7 @@ TEST_P(Faults, OfTheAccelerometerAreNoticedAndOvercome) {
     for (int axis = 0; axis < 3; ++axis) {
       Fault fault;
       fault.force[axis] = size;
-      fault.name = std::string("accelerometer ") + "xyz"[axis] + " " + std::to_string(size).substr(0, 3);
+      fault.name = named("accelerometer", axis, size);
       const Outcome outcome = shown(fault);
       EXPECT_LT(outcome.noticed, 3.05) << fault.name;
       EXPECT_LT(outcome.nees, 5) << fault.name;

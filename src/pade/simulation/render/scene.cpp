@@ -283,7 +283,7 @@ std::array<bool, ray_packet_size> Scene::occluded(const RayPacket& rays, Blocker
   const RTCScene scene = implementation_->embree.scene;
   RTCIntersectContext context = coherent_context();
   std::array<bool, ray_packet_size> hidden{};
-  const auto trace = [&](auto packet, std::size_t first, const auto& with) {
+  const auto trace = [&](auto&& packet, std::size_t first, const auto& with) {
     fill(packet, rays, first, mask);
     with(rays.active.data() + first, scene, &context, &packet);
     for (std::size_t i = 0; i < implementation_->lanes; ++i)
