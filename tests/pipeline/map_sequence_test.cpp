@@ -114,7 +114,7 @@ TEST_F(MapSequence, AGoodRunHasNoHintsAndItsCountsAddUp) {
   EXPECT_EQ(info.motion.still_pairs, 0U);
   const Eigen::Vector3d step = io::Sequence::open(sequence())->pose(1).translation -
                                io::Sequence::open(sequence())->pose(0).translation;
-  // The last pair of a frame spans as many frames as there are before it, up to 4: 1, 2, 3, 4, 4 steps.
+  // The farthest view of a frame is the first one: 1, 2, 3, 4, 5 steps.
   EXPECT_NEAR(info.motion.baseline, 3 * step.norm(), 0.3 * step.norm());
   EXPECT_EQ(info.motion.rotation_sigma, 0) << "exact poses";
   EXPECT_EQ(info.masked_share, 0);

@@ -267,6 +267,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   // Average optical flow and calculate the depth image (Section 2.3).
   estimate_depth(pair, reference, prior.R_reference_other, update_.depth);
   update_.step = options_.step;
+  update_.motion = pair.motion;
   update_.views = 0;
   if (many_views()) {
     see_from_many(newest.frame, pair);
@@ -280,7 +281,6 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   }
   update_.depth.time = reference.time;
   update_.reference = reference;
-  update_.motion = pair.motion;
   update_.flow = pair.flow;
 
   // Back-project and update the occupancy map (Section 4.2).
@@ -377,6 +377,7 @@ void ObstacleMapper::look_farther_back(const Frame& newest, Pair& pair) {
   estimate_depth(pair, newest, {}, update_.depth);
   const Stopwatch watch(update_, Stage::depth);
   depth::fuse_pairs(first_depth_, update_.depth);
+  update_.motion = motion;
   update_.step = step;
 }
 
@@ -438,6 +439,8 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   const depth::CommonError common(camera_, motions, options_.views.flow.largest_parallax);
   depth::read_views(field, scale, common, options_.depth, options_.views.depth, update_.depth);
   found_ = {newest.T_world_camera, field.distance * (1 / scale)};
+  update_.motion = motions.back();
+  update_.step = chosen.back();
   update_.views = static_cast<int>(chosen.size());
 }
 

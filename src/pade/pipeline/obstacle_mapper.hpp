@@ -119,11 +119,13 @@ struct MapperUpdate {
   };
   Outcome outcome = Outcome::waiting;
   std::string reason;
-  Frame reference;        ///< the frame of the depth image, grey; its pose is the refined one
-  RelativeMotion motion;  ///< the other camera of the (last) pair seen from the reference, refined
-  FlowField flow;  ///< of that pair, from the reference to the other image (derotated where derotate = image)
+  Frame reference;  ///< the frame of the depth image, grey; its pose is the refined one
+  RelativeMotion
+      motion;      ///< the farthest camera that the depth was read from, seen from the reference, refined
   int step = 0;    ///< frames between the two
-  int views = 0;   ///< further frames that the depth was read from, together; 0 = from the pair alone
+  int views = 0;   ///< further frames that the depth was read from, together; 0 = from pairs
+  FlowField flow;  ///< of the last pair, from the reference to the other image (derotated where derotate =
+                   ///< image); with further views this is the pair of options.step
   depth::RefinedMotion refinement;  ///< of the motion over `step` of the options, and how it was found
   DepthImage depth;
   depth::DepthDiagnostics diagnostics;

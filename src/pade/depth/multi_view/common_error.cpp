@@ -1,68 +1,57 @@
 #include "pade/depth/multi_view/common_error.hpp"
 
 #include <algorithm>
-#include <cstddef>
+
+#include "pade/depth/derotation.hpp"
 
 namespace pade::depth {
+namespace {
+
+/// a^T A and a^T B of a pixel.
+struct Lever {
+  Eigen::Vector3d translation, rotation;
+};
+
+Lever lever(const Camera& camera, const Eigen::Vector2d& p, const Eigen::Vector2d& a) {
+  Lever lever;
+  for (int i = 0; i < 3; ++i) {
+    lever.translation[i] = a.dot(times_A(camera, p, Eigen::Vector3d::Unit(i)));
+    lever.rotation[i] = a.dot(times_B(camera, p, Eigen::Vector3d::Unit(i)));
+  }
+  return lever;
+}
+
+}  // namespace
 
 CommonError::CommonError(const Camera& camera, const std::vector<RelativeMotion>& views,
                          double largest_parallax)
-    : fx_(static_cast<float>(camera.fx)),
-      fy_(static_cast<float>(camera.fy)),
-      cx_(static_cast<float>(camera.cx)),
-      cy_(static_cast<float>(camera.cy)),
-      largest_parallax2_(static_cast<float>(largest_parallax * largest_parallax)) {
+    : largest_parallax2_(static_cast<float>(largest_parallax * largest_parallax)) {
   const auto known = [](const RelativeMotion& motion) { return !motion.covariance.isZero(0); };
   if (std::none_of(views.begin(), views.end(), known)) return;
-  for (const RelativeMotion& motion : views) {
-    View view{};
-    for (int i = 0; i < 3; ++i)
-      view.t.at(static_cast<std::size_t>(i)) = static_cast<float>(motion.t_reference_other[i]);
-    std::size_t index = 0;
-    for (int r = 0; r < 6; ++r) {
-      for (int c = r; c < 6; ++c) {
-        view.covariance.at(index++) = static_cast<float>((r == c ? 1 : 2) * motion.covariance(r, c));
+  std::vector<RelativeMotion> sorted = views;
+  std::sort(sorted.begin(), sorted.end(), [](const RelativeMotion& a, const RelativeMotion& b) {
+    return a.t_reference_other.squaredNorm() > b.t_reference_other.squaredNorm();
+  });
+  views_ = sorted.size();
+  columns_ = (camera.width + kCell - 1) / kCell;
+  const int rows = (camera.height + kCell - 1) / kCell;
+  cells_.reserve(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns_) * views_);
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns_; ++c) {
+      const Eigen::Vector2d p(c * kCell + 0.5 * (kCell - 1) - camera.cx,
+                              r * kCell + 0.5 * (kCell - 1) - camera.cy);
+      for (const RelativeMotion& motion : sorted) {
+        const Eigen::Vector2d a = times_A(camera, p, motion.t_reference_other);
+        const auto [t, theta] = lever(camera, p, a);
+        const double aa = std::max(a.squaredNorm(), 1e-9);
+        const auto scaled = [&](double value) { return static_cast<float>(value / (aa * aa)); };
+        const Matrix6d& sigma = motion.covariance;
+        cells_.push_back({static_cast<float>(aa), scaled(t.dot(sigma.topLeftCorner<3, 3>() * t)),
+                          scaled(2 * t.dot(sigma.topRightCorner<3, 3>() * theta)),
+                          scaled(theta.dot(sigma.bottomRightCorner<3, 3>() * theta))});
       }
     }
-    views_.push_back(view);
   }
-  const auto longer = [](const View& a, const View& b) {
-    const auto squared = [](const View& v) { return v.t[0] * v.t[0] + v.t[1] * v.t[1] + v.t[2] * v.t[2]; };
-    return squared(a) > squared(b);
-  };
-  std::sort(views_.begin(), views_.end(), longer);
-}
-
-float CommonError::operator()(int u, int v, float rho) const {
-  if (views_.empty()) return 0;
-  const float x = static_cast<float>(u) - cx_;
-  const float y = static_cast<float>(v) - cy_;
-  const View* view = &views_.back();
-  float ax = 0;
-  float ay = 0;
-  for (const View& candidate : views_) {
-    ax = x * candidate.t[2] - fx_ * candidate.t[0];
-    ay = y * candidate.t[2] - fy_ * candidate.t[1];
-    view = &candidate;
-    if ((ax * ax + ay * ay) * rho * rho <= largest_parallax2_) break;
-  }
-  const float bx = ax * fx_;
-  const float by = ay * fy_;
-  const float p = x / fx_;
-  const float q = y / fy_;
-  const std::array<float, 6> j = {rho * bx,
-                                  rho * by,
-                                  -rho * (ax * x + ay * y),
-                                  bx * (-p * q) + by * (-1.0F - q * q),
-                                  bx * (1.0F + p * p) + by * (p * q),
-                                  bx * -q + by * p};
-  float sum = 0;
-  std::size_t index = 0;
-  for (std::size_t r = 0; r < 6; ++r) {
-    for (std::size_t c = r; c < 6; ++c) sum += view->covariance[index++] * j[r] * j[c];
-  }
-  const float aa = std::max(ax * ax + ay * ay, 1e-12F);
-  return std::max(sum, 0.0F) / (aa * aa);
 }
 
 }  // namespace pade::depth

@@ -2,7 +2,7 @@
 // image.
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <vector>
 
 #include "pade/core/camera.hpp"
@@ -22,17 +22,27 @@ class CommonError {
   /// over which a view is not used for a point
   CommonError(const Camera& camera, const std::vector<RelativeMotion>& views, double largest_parallax);
 
-  [[nodiscard]] bool is_exact() const { return views_.empty(); }
-  /// Variance of the inverse depth `rho` (1/m) of pixel (u, v), 1/m^2.
-  [[nodiscard]] float operator()(int u, int v, float rho) const;
+  [[nodiscard]] bool is_exact() const { return cells_.empty(); }
+  /// Variance of the inverse depth `rho` (1/m) of pixel (u, v), 1/m^2; as it is in the middle of the pixel's
+  /// cell, 4 x 4.
+  [[nodiscard]] float operator()(int u, int v, float rho) const {
+    if (cells_.empty()) return 0;
+    const Cell* cell = &cells_[static_cast<std::size_t>(v / kCell * columns_ + u / kCell) * views_];
+    const Cell* const shortest = cell + views_ - 1;
+    while (cell != shortest && cell->parallax2 * rho * rho > largest_parallax2_) ++cell;
+    return rho * (rho * cell->of_translation + cell->of_both) + cell->of_rotation;
+  }
 
  private:
-  struct View {
-    std::array<float, 3> t;
-    std::array<float, 21> covariance;  // upper triangle, row by row; twice what is off the diagonal
+  static constexpr int kCell = 4;  // px
+  /// Of one view: the variance is a quadratic in rho.
+  struct Cell {
+    float parallax2;  // |a|^2
+    float of_translation, of_both, of_rotation;
   };
-  std::vector<View> views_;  // longest first
-  float fx_ = 1, fy_ = 1, cx_ = 0, cy_ = 0;
+  std::vector<Cell> cells_;  // row by row, the views of each together, longest first
+  std::size_t views_ = 0;
+  int columns_ = 0;
   float largest_parallax2_ = 0;
 };
 

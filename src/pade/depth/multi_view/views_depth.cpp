@@ -6,7 +6,9 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "pade/core/compute/simd.hpp"
 #include "pade/core/option_check.hpp"
+#include "pade/depth/multi_view/start_kernel.hpp"
 
 namespace pade::depth {
 namespace {
@@ -18,55 +20,6 @@ constexpr float kTexture = 1.6F;     // least squared slopes, in those of noise
 constexpr float kVague = 0.5F;       // px: sigma of the parallax from which on the image says nothing of it
 
 constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
-
-/// Bilinear; NaN outside.
-float at(const cv::Mat& values, float x, float y) {
-  const bool inside =
-      x >= 0 && y >= 0 && x < static_cast<float>(values.cols - 1) && y < static_cast<float>(values.rows - 1);
-  if (!inside) return std::numeric_limits<float>::quiet_NaN();
-  const int ix = static_cast<int>(x);
-  const int iy = static_cast<int>(y);
-  const float ax = x - static_cast<float>(ix);
-  const float ay = y - static_cast<float>(iy);
-  const auto* top = values.ptr<float>(iy) + ix;
-  const auto* bottom = values.ptr<float>(iy + 1) + ix;
-  const float above = top[0] + ax * (top[1] - top[0]);
-  const float below = bottom[0] + ax * (bottom[1] - bottom[0]);
-  return above + ay * (below - above);
-}
-
-/// Looks up in another frame what it knows of a point.
-class Lookup {
- public:
-  Lookup(const InverseDepthImage& last, const Camera& camera, const Pose& T_world_camera)
-      : rho_(last.rho),
-        fx_(static_cast<float>(camera.fx)),
-        fy_(static_cast<float>(camera.fy)),
-        cx_(static_cast<float>(camera.cx)),
-        cy_(static_cast<float>(camera.cy)) {
-    const Pose T_last_camera = last.T_world_camera.inverse() * T_world_camera;
-    R_ = T_last_camera.matrix3().cast<float>();
-    t_ = T_last_camera.translation.cast<float>();
-  }
-  /// Inverse depth, here, of what the last frame saw where a point of inverse depth `rho` on the ray of (x,
-  /// y) was; NaN = it did not see it.
-  [[nodiscard]] float operator()(float x, float y, float rho) const {
-    const Eigen::Vector3f ray = R_ * Eigen::Vector3f((x - cx_) / fx_, (y - cy_) / fy_, 1);
-    const Eigen::Vector3f q = ray + rho * t_;
-    const float nan = std::numeric_limits<float>::quiet_NaN();
-    if (!(q.z() > 0)) return nan;
-    const float there = at(rho_, fx_ * q.x() / q.z() + cx_, fy_ * q.y() / q.z() + cy_);
-    // Z_last = Z ray_z + t_z
-    const float here = there * ray.z() / (1 - there * t_.z());
-    return here * kNearest < 1 ? here : nan;
-  }
-
- private:
-  cv::Mat rho_;
-  float fx_, fy_, cx_, cy_;
-  Eigen::Matrix3f R_;
-  Eigen::Vector3f t_;
-};
 
 }  // namespace
 
@@ -83,35 +36,35 @@ cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Ca
                        const RelativeMotion& motion, const Pose& T_world_camera,
                        const InverseDepthImage& last, double baseline, const ViewsDepthOptions& options) {
   const Eigen::Vector3f t = motion.t_reference_other.cast<float>();
-  const float fx_tx = static_cast<float>(camera.fx) * t.x();
-  const float fy_ty = static_cast<float>(camera.fy) * t.y();
-  const float damping = std::pow(kEpipoleRadius * t.norm(), 2.0F);
-  const auto cx = static_cast<float>(camera.cx);
-  const auto cy = static_cast<float>(camera.cy);
-  const auto agreement = static_cast<float>(options.agreement);
-  const auto slack = static_cast<float>(3 / (camera.fx * baseline));
-  const bool asks = !last.empty();
-  const Lookup lookup(last, camera, T_world_camera);
-  cv::Mat start(flow.size(), CV_32FC1);
-  for (int v = 0; v < flow.rows; ++v) {
-    const auto* w = flow.ptr<cv::Vec2f>(v);
-    const auto* depth = two_view.depth.ptr<float>(v);
-    auto* out = start.ptr<float>(v);
-    const auto y = static_cast<float>(v);
-    const float ay = (y - cy) * t.z() - fy_ty;
-    for (int u = 0; u < flow.cols; ++u) {
-      const auto x = static_cast<float>(u);
-      const float ax = (x - cx) * t.z() - fx_tx;
-      const float ad = ax * w[u][0] + ay * w[u][1];
-      const float reach = ad > 0 ? ad / (ax * ax + ay * ay + damping) : 0.0F;  // of Z - t_z
-      float rho = depth[u] > 0 ? 1 / depth[u] : reach / (1 + reach * t.z());
-      if (!(rho >= 0) || rho * kNearest > 1) rho = 0;
-      if (asks) {
-        const float found = lookup(x, y, rho);
-        if (std::abs(found - rho) < agreement * std::max(found, rho) + slack) rho = found;
-      }
-      out[u] = rho;
+  StartParameters p{};
+  p.fx = static_cast<float>(camera.fx);
+  p.fy = static_cast<float>(camera.fy);
+  p.cx = static_cast<float>(camera.cx);
+  p.cy = static_cast<float>(camera.cy);
+  p.fx_tx = p.fx * t.x();
+  p.fy_ty = p.fy * t.y();
+  p.tz = t.z();
+  p.damping = std::pow(kEpipoleRadius * t.norm(), 2.0F);
+  p.most = 1 / kNearest;
+  p.width = flow.cols;
+  p.height = flow.rows;
+  p.agreement = static_cast<float>(options.agreement);
+  p.slack = static_cast<float>(3 / (camera.fx * baseline));
+  if (!last.empty()) {
+    p.last = last.rho.ptr<float>();
+    p.last_stride = static_cast<int>(last.rho.step1());
+    const Pose T_last_reference = last.T_world_camera.inverse() * T_world_camera;
+    const Eigen::Matrix3d R = T_last_reference.matrix3();
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) p.R[3 * r + c] = static_cast<float>(R(r, c));
+      p.t[r] = static_cast<float>(T_last_reference.translation[r]);
     }
+  }
+  cv::Mat start(flow.size(), CV_32FC1);
+  const auto isa = simd::best();
+  for (int y = 0; y < flow.rows; ++y) {
+    PADE_DISPATCH(start_row, isa)
+    (p, y, two_view.depth.ptr<float>(y), flow.ptr<float>(y), start.ptr<float>(y));
   }
   return start;
 }
