@@ -206,12 +206,14 @@ void run(const MapArguments& arguments, Context& context) {
 void add_pipeline_options(CLI::App& map, MapArguments& a) {
   std::vector<std::string> methods = flow::flow_estimator_names();
   methods.emplace_back("dis");
-  map.add_option("--flow", a.flow, "optical-flow method (default clg-fast-half); dis = dis-medium")
+  map.add_option("--flow", a.flow,
+                 "optical-flow method (default clg-fast-half, of which multi-view uses a cheaper form);\ndis "
+                 "= dis-medium")
       ->check(CLI::IsMember(methods));
   add_enum(
       map, "--depth", a.depth,
       "from the frames of the last seconds (multi-view, the default), from pairs of frames with refined\n"
-      "motion, checks and bounds (two-view: about half the time), or from one pair as in the paper: with "
+      "motion, checks and bounds (two-view: less time), or from one pair as in the paper: with "
       "the\npose (pade) or by time to collision (ttc)");
   add_enum(map, "--model", a.model,
            "finite motion (exact, the default) or Eq. 1 of the paper (instantaneous)");

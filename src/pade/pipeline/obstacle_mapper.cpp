@@ -94,6 +94,15 @@ flow::FlowOptions flow_options(int level, flow::InitialFlow initial) {
   options.initial_level = level;
   return options;
 }
+/// The paper's order and its derotation of the flow know one pair only.
+bool two_baselines(const ObstacleMapperOptions& o) {
+  return o.longest_step > o.step && o.order == Order::newest && o.derotation == depth::Derotation::image;
+}
+
+bool many_views(const ObstacleMapperOptions& o) {
+  return o.views.count > 0 && two_baselines(o) && o.depth.window == 1 && o.depth.gates == depth::Gates::on;
+}
+
 constexpr int kGuidedLevel = 1;  // flow over the longer baseline starts near its end
 
 }  // namespace
@@ -149,10 +158,10 @@ ObstacleMapperOptions as_printed(ObstacleMapperOptions options) {
 Result<ObstacleMapper> ObstacleMapper::create(const Camera& camera, const ObstacleMapperOptions& options,
                                               const cv::Mat& valid) {
   if (const Status status = check(camera, options, valid); !status) return status.error();
-  const bool two = options.longest_step > options.step;
+  const bool guided = two_baselines(options) && !many_views(options);
   const flow::FlowOptions first = flow_options(options.prior_level, flow::InitialFlow::competes);
   auto flow = flow::make_flow_estimator(
-      options.flow, two ? flow_options(kGuidedLevel, flow::InitialFlow::replaces) : first);
+      options.flow, guided ? flow_options(kGuidedLevel, flow::InitialFlow::replaces) : first);
   if (!flow) return flow.error();
   flow::ClgOptions guide = flow::clg_guide_options();
   const bool half = guide.pyramid.half_resolution;
@@ -221,21 +230,17 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     ++health_.mapped;
   }
   recent_.push_back(std::move(newest));
-  int kept = two_baselines() ? options_.longest_step : options_.step;
-  if (many_views()) kept = std::max(kept, options_.views.frames);
+  int kept = two_baselines(options_) ? options_.longest_step : options_.step;
+  if (many_views(options_)) kept = std::max(kept, options_.views.frames);
   if (recent_.size() > static_cast<std::size_t>(kept)) recent_.pop_front();
   return update_;
 }
 
-/// The paper's order and its derotation of the flow know one pair only.
-bool ObstacleMapper::two_baselines() const {
-  return options_.longest_step > options_.step && options_.order == Order::newest &&
-         options_.derotation == depth::Derotation::image;
-}
-
-bool ObstacleMapper::many_views() const {
-  return options_.views.count > 0 && two_baselines() && options_.depth.window == 1 &&
-         options_.depth.gates == depth::Gates::on;
+/// What only starts others need not be as good, unless somebody asks for it by name.
+flow::FlowEstimator& ObstacleMapper::flow_of_the_first_pair() {
+  const bool starts = two_baselines(options_);
+  const bool asked_for = many_views(options_) && options_.flow != ObstacleMapperOptions().flow;
+  return starts && !asked_for ? *guide_ : *flow_;
 }
 
 const ObstacleMapper::Tracked& ObstacleMapper::before(int frames) const {
@@ -247,7 +252,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   const Tracked& older = before(options_.step);
   const bool newest_is_reference = options_.order == Order::newest;
   const Frame& reference = newest_is_reference ? newest.frame : older.frame;
-  const bool two = two_baselines();
+  const bool two = two_baselines(options_);
 
   // Relative translation and rotation (Section 2.2), optical flow (Section 2.1), and what the images say of
   // the motion.
@@ -260,7 +265,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
     foretold = foretold_flow(prior);
   }
   Pair pair = match(reference, newest_is_reference ? older.frame : newest.frame, prior,
-                    two ? *guide_ : *flow_, foretold);
+                    flow_of_the_first_pair(), foretold);
   refine(pair, reference);
   place(newest, older);
 
@@ -269,7 +274,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   update_.step = options_.step;
   update_.motion = pair.motion;
   update_.views = 0;
-  if (many_views()) {
+  if (many_views(options_)) {
     see_from_many(newest.frame, pair);
   } else if (two) {
     look_farther_back(newest.frame, pair);

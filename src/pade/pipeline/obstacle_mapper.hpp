@@ -72,7 +72,8 @@ struct ObstacleMapperOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("flow", self.flow, "optical-flow method");
+    field("flow", self.flow,
+          "optical-flow method, of the last pair; with further views the default is a cheaper form of it");
     field("derotate", self.derotation, "image | flow: where rotation is removed");
     field("order", self.order, "newest | first: the frame of a pair on whose pixels the depth lives");
     field("step", self.step, "pairs each frame with the step-th before it");
@@ -185,8 +186,7 @@ class ObstacleMapper {
                  std::unique_ptr<flow::FlowEstimator> flow, std::unique_ptr<flow::FlowEstimator> guide,
                  mapping::OccupancyMap map);
   [[nodiscard]] std::string reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const;
-  [[nodiscard]] bool two_baselines() const;
-  [[nodiscard]] bool many_views() const;
+  flow::FlowEstimator& flow_of_the_first_pair();
   [[nodiscard]] const Tracked& before(int frames) const;
   void map_frame(Tracked& newest);
   [[nodiscard]] cv::Mat foretold_flow(const RelativeMotion& motion) const;
