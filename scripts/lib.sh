@@ -15,6 +15,7 @@ packages_build=(
 )
 packages_test=(libgtest-dev libgmock-dev)
 packages_lint=(clang-format clang-tidy)
+packages_docs=(doxygen)
 
 assume_yes=false
 

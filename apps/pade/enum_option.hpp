@@ -11,7 +11,7 @@
 
 namespace pade::cli {
 
-/// `--name a|b|c`: sets `value`; left alone where the option is not given.
+/// `--name a|b|c`: sets `value`; left alone if the option is not given.
 template <NamedEnum Enum>
 CLI::Option* add_enum(CLI::App& app, const std::string& name, std::optional<Enum>& value,
                       const std::string& help) {

@@ -65,7 +65,7 @@ struct ComparedFrame {
   Time time;
   Pose T_map_camera;
   Pose T_world_camera;
-  std::optional<Eigen::Vector3d> direction;  ///< of flight, camera coordinates; empty where it hardly moves
+  std::optional<Eigen::Vector3d> direction;  ///< of flight, camera coordinates; empty if it hardly moves
 };
 
 /// A run with its sequence as it truly was.

@@ -252,7 +252,7 @@ void add_map(CLI::App& app, Context& context) {
       "SEQUENCE is a folder in the TUM RGB-D, EuRoC or KITTI odometry layout (docs/sequences.md).\n"
       "The run folder holds map.bt and map.ot (octovis), map.json, cloud.ply, trajectory.txt, run.json, "
       "timing.json,\n"
-      "report.html and, where the flight has true depth, evaluation.json and .csv.\n"
+      "report.html and, if the flight has true depth, evaluation.json and .csv.\n"
       "Examples:\n"
       "  pade map flight --out run\n"
       "  pade map flight --out run --flow dis-fast --range 40 --save depth,sigma,state,bound\n"
@@ -269,10 +269,9 @@ void add_map(CLI::App& app, Context& context) {
   map->add_option("--world-up", a->world_up, "axis of the pose world that points up: +x -x +y -y +z -z");
   map->add_option("--camera", a->camera, "which camera of a calibration file that holds several, from 0")
       ->check(CLI::Range(0, 99));
-  map->add_option(
-      "--origin", a->origin,
-      "point of the pose world that is 0 0 0 of the run: auto (default: near the flight where that\n"
-      "is farther than 1 km from 0 0 0, as in UTM), flight, none, or \"x y z\"");
+  map->add_option("--origin", a->origin,
+                  "point of the pose world that is 0 0 0 of the run: auto (default: near the flight if that\n"
+                  "is farther than 1 km from 0 0 0, as in UTM), flight, none, or \"x y z\"");
   map->add_flag("--world-coordinates", a->world_coordinates,
                 "also write cloud and trajectory in the coordinates of the poses (cloud_world.ply ...)");
   map->add_option("--save", a->save, "image stacks to write: any of depth,sigma,state,bound,flow");

@@ -219,7 +219,7 @@ void add_navigate(CLI::App& app, Context& context) {
                    "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md)")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
-  command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, where there are several");
+  command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");
   command->add_option("--rate", arguments->rate, "Frames per second of relative_motion.csv")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
@@ -239,13 +239,14 @@ void add_navigate(CLI::App& app, Context& context) {
   command->add_option("--heading-sigma", arguments->heading_sigma, "Its standard deviation, degrees")
       ->capture_default_str();
   command
-      ->add_option("--gnss-latency", arguments->gnss_latency, "Seconds that the stamps of the GNSS are late")
+      ->add_option("--gnss-latency", arguments->gnss_latency,
+                   "Latency of the GNSS, s: how late its stamps are")
       ->capture_default_str()
       ->check(CLI::Range(-100.0, 100.0));
   arguments->velocity_latency_given =
       command
           ->add_option("--gnss-velocity-latency", arguments->velocity_latency,
-                       "The same of its velocities, where they differ from the positions")
+                       "The same of its velocities, if they differ from the positions")
           ->check(CLI::Range(-100.0, 100.0));
   command->add_option("--baro-latency", arguments->barometer_latency, "The same of the barometer")
       ->check(CLI::Range(-100.0, 100.0));

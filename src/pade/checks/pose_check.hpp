@@ -48,7 +48,7 @@ struct PoseCheckPair {
   cv::Mat first, second;  ///< CV_8UC1, undistorted
   Pose first_pose, second_pose;
   cv::Mat depth;  ///< of the first image, CV_32FC1 metres, NaN = none; empty = not known
-  /// The rows of the frames next to the two, first and second; empty where there are none.
+  /// The rows of the frames next to the two, first and second; empty if there are none.
   std::optional<std::array<Pose, 2>> rows_before = {}, rows_after = {};
 };
 

@@ -1,5 +1,5 @@
-// What a person should hear about a finished run before he relies on its map: never an empty map without a
-// word. The one list of hints for the table, run.json, the report and every other command.
+// What a person should know of a finished run before relying on its map: an empty map never comes without an
+// explanation. The one list of hints for the table, run.json, the report and every other command.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace pade::evaluation {
 
-/// The hints of a run, worst first; none where all is well. What they look at stands in `run.json`, so that a
+/// The hints of a run, worst first; none if all is well. What they look at stands in `run.json`, so that a
 /// run that is read back gives the same. Which there are:
 ///
 ///   no-depth          no pair of frames gave a depth image
@@ -30,7 +30,7 @@ namespace pade::evaluation {
 /// @param info  as RunWriter::completed() gives it; its own hints are not looked at
 std::vector<Hint> hints_of(const io::RunInfo& info);
 
-/// Lines for a terminal: severity, message and advice of each hint; empty where there is none.
+/// Lines for a terminal: severity, message and advice of each hint; empty if there is none.
 std::string to_table(const std::vector<Hint>& hints);
 
 }  // namespace pade::evaluation

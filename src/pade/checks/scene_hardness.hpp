@@ -42,7 +42,7 @@ struct SceneHardness {
 SceneHardness scene_hardness(const cv::Mat& image, const cv::Mat& depth);
 
 /// Of at most `frames` frames spread over a sequence with true depth; frames without depth are passed over.
-/// An error where no frame has any.
+/// An error if no frame has any.
 Result<SceneHardness> scene_hardness(const io::Sequence& sequence, int frames = 26);
 
 /// Shares in percent on one line, as `pade info` prints it.

@@ -36,7 +36,7 @@ struct SequenceCheck {
 };
 
 /// Looks at `pairs` pairs of frames spread over the sequence (poses and times at all of them). Frames that
-/// cannot be decoded are passed over; an error only where none of them can.
+/// cannot be decoded are passed over; an error only if none of them can.
 Result<SequenceCheck> check_sequence(const io::Sequence& sequence, int step = 1, int pairs = 14);
 
 }  // namespace pade::evaluation

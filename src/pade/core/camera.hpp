@@ -21,21 +21,22 @@ enum class Distortion {
 /// Intrinsics of one camera. Pixel centres are at integer coordinates: the centre of the top-left pixel is
 /// (0, 0).
 struct Camera {
-  int width = 0;   ///< pixels
-  int height = 0;  ///< pixels
-  double fx = 0;   ///< focal length, pixels
-  double fy = 0;
-  double cx = 0;  ///< principal point, pixels
-  double cy = 0;
-  Distortion distortion = Distortion::none;
-  std::array<double, 8> coefficients{};  ///< in the order of the model, the rest zero
+  int width = 0;                             ///< pixels
+  int height = 0;                            ///< pixels
+  double fx = 0;                             ///< focal length, horizontal, pixels
+  double fy = 0;                             ///< focal length, vertical, pixels
+  double cx = 0;                             ///< principal point, x to the right, pixels
+  double cy = 0;                             ///< principal point, y down, pixels
+  Distortion distortion = Distortion::none;  ///< lens model
+  std::array<double, 8> coefficients{};      ///< in the order of the model, the rest zero
 
+  /// Width and height, pixels.
   [[nodiscard]] cv::Size size() const { return {width, height}; }
-  [[nodiscard]] Eigen::Matrix3d matrix() const;  ///< K
+  [[nodiscard]] Eigen::Matrix3d matrix() const;  ///< K = [fx 0 cx; 0 fy cy; 0 0 1], pixels
 
   /// The distortion-free camera that undistorted images have: same size, focal lengths and principal point.
   [[nodiscard]] Camera undistorted() const;
-  /// True where every coefficient is zero, so that images need no undistortion.
+  /// True if every coefficient is zero, so that images need no undistortion.
   [[nodiscard]] bool is_pinhole() const;
 
   /// Pixel of a point in camera coordinates (metres). Empty for points behind the camera (Z <= 0; for the
@@ -43,17 +44,17 @@ struct Camera {
   /// up to which the distortion polynomial is monotonic.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point) const;
 
-  /// Viewing ray (x/z, y/z, 1) of a pixel, the inverse of project(). Empty where the inverse does not exist
+  /// Viewing ray (x/z, y/z, 1) of a pixel, the inverse of project(). Empty if the inverse does not exist
   /// (outside the monotonic range, or 90 degrees and more off the axis).
   [[nodiscard]] std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const;
 
-  bool operator==(const Camera&) const = default;
+  bool operator==(const Camera&) const = default;  ///< all fields are equal
 };
 
 /// Resamples images of a distorted camera to its undistorted() pinhole. Built once, used for every frame.
 class Undistorter {
  public:
-  /// Where `camera.is_pinhole()` images pass through unchanged.
+  /// Images pass through unchanged if `camera.is_pinhole()`.
   explicit Undistorter(const Camera& camera);
 
   /// `image`: any type, of the camera's size. Pixels that see nothing are 0.

@@ -22,13 +22,14 @@ enum class DepthState : std::uint8_t {
   out_of_view = 5,   ///< masked, outside the lens, or its match lies outside the other image
   far = 6,           ///< textured and matched, and its `bound` lies beyond the range
 };
+/// Of the states, by their number: the legend in `run.json` and reports.
 inline constexpr std::array<std::string_view, 7> depth_state_names = {
     "measured", "epipole", "low parallax", "no texture", "inconsistent", "out of view", "far"};
 
 /// Z-depth on the pixel grid of the undistorted frame taken at `time`. With window n > 1 the images have
 /// ceil(height / n) x ceil(width / n) cells, and a cell stands for its n x n pixels.
 struct DepthImage {
-  Time time;
+  Time time;         ///< of the frame
   int window = 1;    ///< n
   cv::Mat depth;     ///< CV_32FC1, metres along the optical axis; NaN = no depth
   cv::Mat variance;  ///< CV_32FC1, m^2; NaN where there is no depth
@@ -40,6 +41,7 @@ struct DepthImage {
   /// has a depth. NaN = nothing is known; empty = depth less some sigmas, where there is depth.
   cv::Mat bound{};
 
+  /// True of an image without pixels: nothing was estimated.
   [[nodiscard]] bool empty() const { return depth.empty(); }
 };
 

@@ -1,4 +1,4 @@
-// One number for a lot of bytes: tells inputs apart, not friend from foe.
+// One number for a lot of bytes: tells inputs apart; it is not cryptographic.
 #pragma once
 
 #include <cstddef>

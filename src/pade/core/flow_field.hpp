@@ -8,10 +8,11 @@ namespace pade {
 /// Dense optical flow w on the pixel grid of the first of two images: first(p) = second(p + w(p)).
 struct FlowField {
   cv::Mat vectors;  ///< CV_32FC2, pixels (x right, y down); NaN in either component = no flow
-  /// Standard deviation of each component, pixels. CV_32FC1, or empty where the method gives none.
+  /// Standard deviation of each component, pixels. CV_32FC1, or empty if the method gives none.
   /// Infinity or NaN = the image says nothing here.
   cv::Mat sigma;
 
+  /// True of a field without pixels: nothing was estimated.
   [[nodiscard]] bool empty() const { return vectors.empty(); }
 };
 
@@ -27,6 +28,7 @@ struct ParallaxField {
   cv::Mat texture;   ///< squared slopes of the image along the parallax, in those of the noise around; noise
                      ///< alone: .9
 
+  /// True of a field without pixels: nothing was estimated.
   [[nodiscard]] bool empty() const { return distance.empty(); }
 };
 

@@ -10,7 +10,7 @@ namespace pade {
 
 /// An undistorted image, when it was taken, and from where.
 struct Frame {
-  Time time;
+  Time time;            ///< when it was taken
   cv::Mat image;        ///< CV_8UC1 (grey) or CV_8UC3 (BGR)
   Pose T_world_camera;  ///< camera x right, y down, z forward; metres
   /// Of the motion from the frame before to this one, as RelativeMotion has it with the one before as

@@ -1,6 +1,6 @@
 // The little of Lie group theory that the filter uses: SO(3) and the extended poses SE_2(3) of Barrau and
-// Bonnabel
-// ("The invariant extended Kalman filter as a stable observer", IEEE TAC 2017). Notation: docs/navigation.md.
+// Bonnabel ("The invariant extended Kalman filter as a stable observer", IEEE TAC 2017). Notation:
+// docs/navigation.md.
 #pragma once
 
 #include <cmath>
@@ -15,8 +15,8 @@ namespace pade::navigation {
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-using Vector9d = Eigen::Matrix<double, 9, 1>;
-using Matrix9d = Eigen::Matrix<double, 9, 9>;
+using Vector9d = Eigen::Matrix<double, 9, 1>;  ///< (rotation, velocity, position)
+using Matrix9d = Eigen::Matrix<double, 9, 9>;  ///< in the order of Vector9d
 
 /// [v]x: skew(a) * b = a x b.
 inline Matrix3d skew(const Vector3d& v) {
@@ -38,13 +38,15 @@ inline Matrix3d right_jacobian(const Vector3d& phi) { return left_jacobian(-phi)
 
 /// An element of SE_2(3): rotation, velocity and position of the body in the world.
 struct ExtendedPose {
-  Quaterniond R = Quaterniond::Identity();
-  Vector3d v = Vector3d::Zero();
-  Vector3d p = Vector3d::Zero();
+  Quaterniond R = Quaterniond::Identity();  ///< R_world_body, unit norm
+  Vector3d v = Vector3d::Zero();            ///< velocity in the world, m/s
+  Vector3d p = Vector3d::Zero();            ///< position in the world, m
 
+  /// The group's product, that of the 5x5 matrices [R v p; 0 1 0; 0 0 1].
   ExtendedPose operator*(const ExtendedPose& other) const {
     return {(R * other.R).normalized(), v + R * other.v, p + R * other.p};
   }
+  /// X^-1 in that group: X * X.inverse() is the identity.
   [[nodiscard]] ExtendedPose inverse() const {
     return {R.conjugate(), -(R.conjugate() * v), -(R.conjugate() * p)};
   }
@@ -54,6 +56,7 @@ struct ExtendedPose {
     const Matrix3d V = left_jacobian(xi.head<3>());
     return {rotation_exp(xi.head<3>()), V * xi.segment<3>(3), V * xi.tail<3>()};
   }
+  /// ξ with exp(ξ) = *this; rotation angle in [0, pi].
   [[nodiscard]] Vector9d log() const {
     Vector9d xi;
     xi.head<3>() = rotation_log(R);

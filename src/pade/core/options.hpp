@@ -27,11 +27,13 @@ namespace pade {
 template <class Enum>
 struct EnumNames;
 
+/// An enumeration that has EnumNames.
 template <class Enum>
 concept NamedEnum = std::is_enum_v<Enum> && requires {
   EnumNames<Enum>::names;
 };
 
+/// The name of `value`; "?" if it is none of the enumeration's.
 template <NamedEnum Enum>
 constexpr std::string_view to_name(Enum value) {
   for (const auto& [candidate, name] : EnumNames<Enum>::names) {
@@ -40,6 +42,7 @@ constexpr std::string_view to_name(Enum value) {
   return "?";
 }
 
+/// The value of this exact name; empty if there is none.
 template <NamedEnum Enum>
 constexpr std::optional<Enum> from_name(std::string_view text) {
   for (const auto& [value, name] : EnumNames<Enum>::names) {
@@ -54,6 +57,7 @@ struct AnyField {
 };
 }  // namespace detail
 
+/// A struct whose `visit` names its fields.
 template <class Options>
 concept OptionStruct = requires(Options& options) {
   Options::visit(options, detail::AnyField{});

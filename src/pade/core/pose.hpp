@@ -8,8 +8,8 @@
 
 namespace pade {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;  ///< (translation, rotation vector)
+using Matrix6d = Eigen::Matrix<double, 6, 6>;  ///< in the order of Vector6d
 
 /// A rigid transform T_a_b (rotation, then translation). As a camera pose it is T_world_camera: camera x
 /// right, y down, z forward; metres.
@@ -17,20 +17,22 @@ struct Pose {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< unit norm, Hamilton
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();         ///< origin of b in a, metres
 
-  [[nodiscard]] Pose inverse() const;
+  [[nodiscard]] Pose inverse() const;                             ///< T_b_a
   Pose operator*(const Pose& other) const;                        ///< T_a_c = T_a_b * T_b_c
   Eigen::Vector3d operator*(const Eigen::Vector3d& point) const;  ///< p_a = T_a_b * p_b
+  /// The rotation as a matrix R_a_b.
   [[nodiscard]] Eigen::Matrix3d matrix3() const { return rotation.toRotationMatrix(); }
+  /// False if any number is NaN or infinite.
   [[nodiscard]] bool is_finite() const;
 };
 
 /// Rotation vector (axis times angle in [0, pi]) of a rotation: the logarithm of SO(3).
 Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation);
-Eigen::Vector3d rotation_log(const Eigen::Quaterniond& rotation);
+Eigen::Vector3d rotation_log(const Eigen::Quaterniond& rotation);  ///< of a unit quaternion
 /// The rotation of a rotation vector: the exponential of SO(3).
 Eigen::Quaterniond rotation_exp(const Eigen::Vector3d& rotation_vector);
 /// The least rotation that turns the direction of `from` into that of `to`; neither is zero. It is Eigen's
-/// FromTwoVectors, which is dear to compile: once is enough.
+/// FromTwoVectors, compiled once because it takes long.
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// The pose a fraction `s` in [0, 1] of the way from `a` to `b` at constant body velocity on SE(3):
@@ -44,7 +46,7 @@ struct RelativeMotion {
   Eigen::Matrix3d R_reference_other = Eigen::Matrix3d::Identity();  ///< directions: other -> reference
   Eigen::Vector3d t_reference_other =
       Eigen::Vector3d::Zero();  ///< other camera's position in the reference, m
-  double duration = 0;  ///< seconds from the reference to the other frame; negative where the other is older
+  double duration = 0;  ///< seconds from the reference to the other frame; negative if the other is older
   /// Covariance of (translation, rotation vector), in the reference frame: t + dt, exp(dtheta) R. Zero =
   /// exact.
   Matrix6d covariance = Matrix6d::Zero();

@@ -26,7 +26,7 @@ struct DepthInput {
   cv::Mat reference{};                       ///< CV_8UC1, the image on whose pixels the depth lives
   cv::Mat other{};                           ///< CV_8UC1, the other image as it was matched
   cv::Mat valid{};  ///< CV_8UC1, 0 where no frame sees anything (lens, airframe); empty = all valid
-  /// The rotation (other to reference) that was removed from the image before matching, where it is not
+  /// The rotation (other to reference) that was removed from the image before matching, if it is not
   /// motion.R_reference_other: the motion was refined since.
   std::optional<Eigen::Matrix3d> rotation_removed{};
 
@@ -46,7 +46,7 @@ struct DepthInput {
 /// What was found out about the pair as a whole.
 struct DepthDiagnostics {
   double flow_sigma = 0;                  ///< standard deviation of each flow component that was used, px
-  double image_noise = 0;                 ///< grey levels; 0 where there were no images
+  double image_noise = 0;                 ///< grey levels; 0 if there were no images
   std::optional<FocusOfExpansion> focus;  ///< TTC only
 };
 
@@ -56,23 +56,27 @@ struct DepthDiagnostics {
 /// With a = -A t and D the derotated flow (paper Eq. 1 with the signs of docs/method.md):
 ///   exact         Z = a.a / a.D + t_z      variance (Z - t_z)^4 sigma^2 / |a|^2 (1 + 18 e^2 + 400 e^4)
 ///   instantaneous Z = a.a / a.d
-///   samelson      Z = a.d / d.d (Eq. 2 as the inverse of a 2-vector), plus t_z where exact
+///   samelson      Z = a.d / d.d (Eq. 2 as the inverse of a 2-vector), plus t_z if exact
 /// (with e = sigma / |D|: the mean squared error of 1/(1/Z) for a log-uniform prior on depth, which is 1 for
-/// clear parallax) plus J Sigma J^T where the motion has a covariance Sigma. TTC is the same with the epipole
+/// clear parallax) plus J Sigma J^T if the motion has a covariance Sigma. TTC is the same with the epipole
 /// found in the flow (focus of expansion e) in place of the pose's: a = t_z (p - e).
 class DepthEstimator {
  public:
+  /// Of options that check() accepts.
   explicit DepthEstimator(const DepthOptions& options) : options_(options) {}
 
+  /// @param input  one pair of frames; flow and images of the camera's size.
   /// @param out  Depth image of input.motion's reference frame; its buffers are reused. `out.time` is left
   /// alone.
   void estimate(const DepthInput& input, DepthImage& out);
+  /// The same, as a new image.
   DepthImage estimate(const DepthInput& input) {
     DepthImage out;
     estimate(input, out);
     return out;
   }
 
+  /// As given.
   [[nodiscard]] const DepthOptions& options() const { return options_; }
   /// Per pixel of the last estimate(): 0, or the state that image and mask force on it.
   [[nodiscard]] const cv::Mat& gate() const { return gate_; }

@@ -1,5 +1,5 @@
 // The arithmetic of PADE on rows of pixels, compiled once per instruction set. Plain arrays in, plain arrays
-// out: the meaning of each quantity is in pade_depth.hpp and docs/method.md.
+// out: the meaning of each quantity is in depth_estimator.hpp and docs/method.md.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
-// Options of depth from motion. The defaults are what we recommend; `literal()` is what the paper prints.
+// Options of depth from motion. The defaults are for exact flow noise; chain_options() is what the chain
+// uses, and as_printed() (pipeline/obstacle_mapper.hpp) what the paper prints.
 #pragma once
 
 #include "pade/core/options.hpp"

@@ -20,6 +20,8 @@ cv::Mat derotate_image(const cv::Mat& image, const Camera& camera, const Relativ
 /// Derotated flow of single pixels, in double precision: the reference of the vectorised kernel.
 class Derotator {
  public:
+  /// @param camera      undistorted pinhole. @param motion  its rotation is what is removed.
+  /// @param model       exact: by the rotation matrix; instantaneous: by B omega.
   /// @param derotation  image: the flow is already derotated and passes through.
   Derotator(const Camera& camera, const RelativeMotion& motion, Model model, Derotation derotation);
   /// Exact, by the rotation that is left in the flow.

@@ -8,6 +8,7 @@
 
 namespace pade::depth {
 
+/// Options of guard_edges().
 struct EdgeOptions {
   int radius = 3;
   double nearness = 0.85;
@@ -20,6 +21,7 @@ struct EdgeOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const EdgeOptions& options);
 
 /// A flow method smears over some pixels: beside an obstacle lie depths between it and the background. Of the

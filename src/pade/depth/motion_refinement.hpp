@@ -42,11 +42,12 @@ struct MotionRefinementOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const MotionRefinementOptions& options);
 
 /// What became of the prior.
 enum class RefinementOutcome {
-  refined,
+  refined,         ///< the images have corrected it
   off,             ///< the options say so
   exact_prior,     ///< its covariance is zero: there is nothing to refine
   hover,           ///< the flow has no parallax to speak of: rotation and translation cannot be told apart
@@ -56,16 +57,16 @@ enum class RefinementOutcome {
                    ///< fills the view, or the prior's covariance is too small
 };
 
-/// Motion of the pair, and how it was found. Where `outcome` is not `refined`, the motion is the prior.
+/// Motion of the pair, and how it was found. If `outcome` is not `refined`, the motion is the prior.
 struct RefinedMotion {
-  RelativeMotion motion;  ///< with its 6x6 covariance
-  RefinementOutcome outcome = RefinementOutcome::off;
-  int pixels = 0;                    ///< that had flow to judge by
+  RelativeMotion motion;                               ///< with its 6x6 covariance
+  RefinementOutcome outcome = RefinementOutcome::off;  ///< what became of the prior
+  int pixels = 0;                                      ///< that had flow to judge by
   double inlier_share = 0;           ///< of them: within the robust limit of their epipolar lines
   double flow_sigma = 0;             ///< robust standard deviation of the flow across the lines, px
   double correlation = 1;            ///< as many of those pixels count as one independent pixel
   double surprise = 0;               ///< squared Mahalanobis distance from the prior to the refined motion
-  double length_sigma_relative = 0;  ///< standard deviation of |t| over |t|; infinite where t = 0
+  double length_sigma_relative = 0;  ///< standard deviation of |t| over |t|; infinite if t = 0
   double direction_sigma = 0;        ///< largest standard deviation of the direction of t, rad
   bool direction_valid = false;      ///< direction_sigma is less than 0.1 rad (6 degrees)
 };
@@ -76,7 +77,7 @@ struct RefinementInput {
   const RelativeMotion& prior;  ///< with covariance; zero = exact
   const FlowField& flow;        ///< from the reference to the other image as it was matched, px; NaN = none
   /// Rotation R_reference_other that was taken out of the other image before matching (derotate_image());
-  /// identity where none was.
+  /// identity if none was.
   Eigen::Matrix3d R_removed = Eigen::Matrix3d::Identity();
   cv::Mat reference{};  ///< CV_8UC1, tells where there is texture; empty = everywhere
   cv::Mat gate{};       ///< CV_8UC1, 0 = usable; empty = all is
@@ -89,10 +90,13 @@ struct RefinementInput {
 /// and direction of translation, with the prior's covariance as one more measurement.
 class MotionRefiner {
  public:
+  /// Of options that check() accepts.
   explicit MotionRefiner(const MotionRefinementOptions& options = {}) : options_(options) {}
 
+  /// The motion of one pair. Never fails: if it cannot be refined, the outcome says why.
   [[nodiscard]] RefinedMotion refine(const RefinementInput& input);
 
+  /// As given.
   [[nodiscard]] const MotionRefinementOptions& options() const { return options_; }
 
   /// A pixel's flow as the refinement reads it.
@@ -112,12 +116,13 @@ class MotionRefiner {
 
 /// Flow across the epipolar line of one match, and its derivatives.
 struct AcrossLine {
-  double residual;  ///< px; NaN where the match lies behind the camera or there is no line (a = 0)
+  double residual;  ///< px; NaN if the match lies behind the camera or there is no line (a = 0)
   double along;     ///< flow along the line, away from the epipole where t_z < 0: the parallax, px
   double length;    ///< |a|, px m
   Eigen::RowVector3d by_translation;  ///< of `residual` by t, px/m
   Eigen::RowVector3d by_rotation;     ///< of `residual` by theta in exp(theta) R, px/rad
 };
+/// That of one match under the motion (R, t) = (R_reference_other, t_reference_other).
 AcrossLine across_line(const Camera& camera, const Eigen::Vector3d& t, const Eigen::Matrix3d& R,
                        const MotionRefiner::Match& match);
 

@@ -14,7 +14,7 @@ struct Interval {
   double high = std::numeric_limits<double>::quiet_NaN();
   int count = 0;  ///< values it is made of
 
-  /// The whole interval lies above (below) `value`; false where there is no interval.
+  /// The whole interval lies above (below) `value`; false if there is no interval.
   [[nodiscard]] bool above(double value) const { return low > value; }
   [[nodiscard]] bool below(double value) const { return high < value; }
 };
@@ -23,8 +23,8 @@ struct Interval {
 /// and the interval is bias-corrected and accelerated (BCa: Efron, Better bootstrap confidence intervals,
 /// 1987), widened for few sequences as Student's t is against the normal (Hesterberg, What teachers should
 /// know about the bootstrap, 2015, Section 3.3). Without the widening a 95 % interval of ten normal values
-/// holds the mean 91 % of the time (measured). Percentiles where the correction does not exist, no width
-/// where all values are equal. An interval never leaves the range of the values, so that fewer than six
+/// holds the mean 91 % of the time (measured). Percentiles if the correction does not exist, no width
+/// if all values are equal. An interval never leaves the range of the values, so that fewer than six
 /// cannot give 95 %.
 /// @param per_sequence  one value per sequence; NaN is left out. @param level  in (0, 1).
 /// The same input gives the same interval.

@@ -30,7 +30,7 @@ struct RecordedPair {
 };
 
 /// Up to `count` pairs (i, i + step) spread evenly over a sequence with true depth. Frames whose pixels or
-/// depth cannot be read, and pairs that see nothing in common, are passed over; an error where there is no
+/// depth cannot be read, and pairs that see nothing in common, are passed over; an error if there is no
 /// pair at all.
 Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, int step, int count);
 

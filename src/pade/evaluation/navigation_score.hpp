@@ -46,7 +46,7 @@ struct MotionError {
 
 std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vector<TrueState>& truth);
 
-/// The value below which a share of the values lies (0.95: the 95 % figure); NaN where there are none.
+/// The value below which a share of the values lies (0.95: the 95 % figure); NaN if there are none.
 double quantile(std::vector<double> values, double share);
 
 struct MotionSummary {

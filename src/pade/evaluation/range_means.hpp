@@ -25,8 +25,8 @@ struct RangeMeans {
   void add(const DepthImage& estimate, const cv::Mat& true_depth, double max_depth, int grid,
            const DepthImage* where = nullptr);
 
-  [[nodiscard]] double mean(std::size_t range) const;      ///< m; NaN where there is nothing
-  [[nodiscard]] double coverage(std::size_t range) const;  ///< pixels / truth; NaN where there is nothing
+  [[nodiscard]] double mean(std::size_t range) const;      ///< m; NaN if there is nothing
+  [[nodiscard]] double coverage(std::size_t range) const;  ///< pixels / truth; NaN if there is nothing
 
   bool operator==(const RangeMeans&) const = default;
 };

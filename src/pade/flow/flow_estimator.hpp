@@ -66,17 +66,19 @@ class FlowEstimator {
   /// @param first, second  CV_8UC1, one size, any stride. Our own methods take CV_16UC1 as well.
   /// @param initial  CV_32FC2 of that size, pixels: where to start the search; empty = zero. NaN, and vectors
   /// that leave the image wherever they start, count as zero. Methods that cannot use it ignore it.
-  /// @return vectors of the images' size; NaN where the method knows that it failed; sigma where it has one;
-  /// an empty field where the images are empty, of another type, or differ in size.
+  /// @return vectors of the images' size; NaN where the method knows that it failed; sigma if it has one;
+  /// an empty field if the images are empty, of another type, or differ in size.
   virtual FlowField estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) = 0;
+  /// The same from nothing: `initial` is zero.
   FlowField estimate(const cv::Mat& first, const cv::Mat& second) {
     return estimate(first, second, cv::Mat());
   }
 
   /// Flow between the image of the previous call and this one. Our own methods keep what they computed from
   /// the previous image, so that a stream costs less than pairs.
-  /// @return an empty field for the first image, and where the size differs from that of the previous image.
+  /// @return an empty field for the first image, and if the size differs from that of the previous image.
   virtual FlowField next(const cv::Mat& image, FlowReference reference, const cv::Mat& initial);
+  /// The same from nothing: `initial` is zero.
   FlowField next(const cv::Mat& image, FlowReference reference = FlowReference::previous) {
     return next(image, reference, cv::Mat());
   }
@@ -85,8 +87,7 @@ class FlowEstimator {
 
   /// Leaves pixels of the first image out from now on: their data has no weight, and their flow is NaN.
   /// @param mask  CV_8UC1 of the images' size, 0 = leave out; empty = use all. A mask of another size than
-  /// the
-  ///              images is not applied. OpenCV's methods ignore it.
+  /// the images is not applied. OpenCV's methods ignore it.
   virtual void set_mask(const cv::Mat& mask);
 
   /// The name that make_flow_estimator() knows.
@@ -99,13 +100,14 @@ class FlowEstimator {
 /// All names in the order of help texts, without aliases.
 const std::vector<std::string>& flow_estimator_names();
 
-/// A method by its name; "dis" is "dis-medium". The error lists the names that exist.
+/// A method by its name. The error lists the names that exist.
+/// @param name     one of flow_estimator_names(); "dis" is "dis-medium".
 /// @param options  for our own methods; OpenCV's ignore them.
 Result<std::unique_ptr<FlowEstimator>> make_flow_estimator(std::string_view name,
                                                            const FlowOptions& options = {});
 
 /// Flow of a part of the images: only `region` and `margin` pixels around it are computed with.
-/// @return vectors (and sigma) of the images' size, NaN outside the region; empty where the images do not
+/// @return vectors (and sigma) of the images' size, NaN outside the region; empty if the images do not
 /// fit.
 FlowField estimate_region(FlowEstimator& method, const cv::Mat& first, const cv::Mat& second, cv::Rect region,
                           int margin = 32);

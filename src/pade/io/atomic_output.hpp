@@ -11,7 +11,7 @@
 
 namespace pade::io {
 
-/// What to do where the output exists already.
+/// What to do if the output exists already.
 enum class Overwrite {
   refuse,   ///< an error, before any work is done
   replace,  ///< the old output stays until the new one is complete
@@ -26,7 +26,7 @@ void watch_for_interrupts();
 bool interrupted();
 /// The error that a loop returns when it leaves because of interrupted().
 Error interrupted_error();
-/// The same where finished parts stay and the next run goes on from them.
+/// The same if finished parts stay and the next run goes on from them.
 Error interrupted_and_kept_error();
 
 /// A folder that appears at its place with commit(), or never. Until then everything lies in a hidden folder
@@ -39,8 +39,12 @@ class OutputFolder {
   static Result<OutputFolder> create(const std::filesystem::path& target, Overwrite overwrite,
                                      std::string_view marker);
 
+  /// @{
+  /// What was moved from holds nothing and can only be assigned to or destroyed; what is assigned to discards
+  /// its own uncommitted files.
   OutputFolder(OutputFolder&& other) noexcept;
   OutputFolder& operator=(OutputFolder&& other) noexcept;
+  /// @}
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
   ~OutputFolder();
@@ -51,9 +55,10 @@ class OutputFolder {
   Result<std::filesystem::path> place(const std::filesystem::path& relative) const;
   /// Writes a file of the folder; every byte is checked.
   Status write(const std::filesystem::path& relative, std::string_view content) const;
+  /// The same for bytes.
   Status write(const std::filesystem::path& relative, std::span<const unsigned char> content) const;
 
-  /// Moves the folder to its place, replacing an old one in one step where the file system can.
+  /// Moves the folder to its place, replacing an old one in one step if the file system can.
   Status commit();
 
  private:

@@ -19,7 +19,7 @@ namespace pade::io {
 /// An enumeration behind its names.
 struct EnumField {
   std::function<std::string_view()> get;
-  std::function<bool(std::string_view)> set;  ///< false where the name does not exist
+  std::function<bool(std::string_view)> set;  ///< false if the name does not exist
   std::vector<std::string_view> names;
 };
 

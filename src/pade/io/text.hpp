@@ -12,13 +12,13 @@
 
 namespace pade::io {
 
-/// Whether there is something of this name; false also where that cannot be found out.
+/// Whether there is something of this name; false also if that cannot be found out.
 bool path_exists(const std::filesystem::path& path);
 
-/// The path from the root; `path` as it is where the working folder cannot be found out.
+/// The path from the root; `path` as it is if the working folder cannot be found out.
 std::filesystem::path absolute_path(const std::filesystem::path& path);
 
-/// The content of a file, text or not. Refused where it is missing, a folder, unreadable, or longer than 1
+/// The content of a file, text or not. Refused if it is missing, a folder, unreadable, or longer than 1
 /// GiB.
 Result<std::string> read_file(const std::filesystem::path& file);
 
@@ -35,7 +35,7 @@ std::vector<Line> data_lines(std::string_view text);
 /// The parts of a line between runs of separators; a comma is one separator, so "a,,b" has an empty field.
 std::vector<std::string_view> split_fields(std::string_view line);
 
-/// A decimal number, which may be NaN or infinite ("nan", "inf"). Empty where the text is not wholly a
+/// A decimal number, which may be NaN or infinite ("nan", "inf"). Empty if the text is not wholly a
 /// number.
 std::optional<double> parse_number(std::string_view text);
 

@@ -1,4 +1,4 @@
-// A YAML document as plain values: the only place that touches yaml-cpp, whose exceptions end here.
+// A YAML document as plain values, read by yaml-cpp, whose exceptions end here.
 #pragma once
 
 #include <cstddef>
@@ -15,12 +15,12 @@ struct Yaml {
   enum class Kind { null, scalar, list, map };
   Kind kind = Kind::null;
   std::size_t line = 0;  ///< in the file, from 1
-  std::string scalar;    ///< text, where `kind` is scalar
+  std::string scalar;    ///< text, if `kind` is scalar
   std::vector<Yaml> list;
   struct Entry;
   std::vector<Entry> map;  ///< in the order of the file; keys are unique
 
-  /// The value of a key of a map; null where there is none (or no map, or its value is empty).
+  /// The value of a key of a map; null if there is none (or no map, or its value is empty).
   [[nodiscard]] const Yaml* find(std::string_view key) const;
 };
 

@@ -54,7 +54,7 @@ class HitCounter {
 
 /// Appends the free cubes that `now` shows and, unless `alone`, at least one of `earlier` shows too, as large
 /// as they can be, in Morton order, as misses of `change`. At most 32 earlier ones.
-/// @return voxels that `now` alone shows free; 0 where `alone`
+/// @return voxels that `now` alone shows free; 0 if `alone`
 std::size_t find_free_cells(const Clearance& now, std::span<const Clearance* const> earlier, bool alone,
                             double voxel, float change, std::vector<CellUpdate>& out);
 

@@ -29,12 +29,12 @@ namespace pade::mapping {
 
 /// How depth becomes occupancy.
 struct MapOptions {
-  double voxel = 0.1;         ///< side of a voxel, m
-  double range = 20;          ///< depth Z up to which the map is updated, m
-  double p_hit = 0.7;         ///< occupancy of a voxel after one hit on an unknown one
-  double p_miss = 0.4;        ///< after one miss
-  double clamp_min = 0.1192;  ///< bounds of the occupancy: how soon the map forgets
-  double clamp_max = 0.971;
+  double voxel = 0.1;                ///< side of a voxel, m
+  double range = 20;                 ///< depth Z up to which the map is updated, m
+  double p_hit = 0.7;                ///< occupancy of a voxel after one hit on an unknown one
+  double p_miss = 0.4;               ///< after one miss
+  double clamp_min = 0.1192;         ///< least occupancy: how soon the map notices what has come
+  double clamp_max = 0.971;          ///< greatest: how soon it forgets what has gone
   double occupancy_threshold = 0.5;  ///< occupied at and above
   double free_margin_sigmas = 2;     ///< a ray is free up to Z - this many sigma
   double free_hole = 0.1;            ///< what is smaller is not looked for, m
@@ -71,9 +71,15 @@ struct MapOptions {
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const MapOptions& options);
 
+/// Levels of the octree: a voxel is a cell at this depth.
 inline constexpr unsigned kTreeDepth = 16;
 
-enum class Occupancy : std::uint8_t { unknown, free, occupied };
+/// State of a voxel.
+enum class Occupancy : std::uint8_t {
+  unknown,   ///< never seen: neither free nor occupied
+  free,      ///< seen through, its occupancy below the threshold
+  occupied,  ///< its occupancy at or above the threshold
+};
 
 /// A voxel, or a cube of 2^k voxels to a side that all have the same state.
 struct MapCell {
@@ -85,10 +91,10 @@ struct MapCell {
 
 /// What one depth image changed. In order of position (Morton order), each place once.
 struct MapChange {
-  std::vector<MapCell> became_occupied;
-  std::vector<MapCell> became_free;  ///< from unknown or from occupied
-  std::size_t hits = 0;              ///< voxels that got a hit
-  std::size_t pending_hits = 0;      ///< voxels, of this image and earlier ones, that wait for another look
+  std::vector<MapCell> became_occupied;  ///< from unknown or from free
+  std::vector<MapCell> became_free;      ///< from unknown or from occupied
+  std::size_t hits = 0;                  ///< voxels that got a hit
+  std::size_t pending_hits = 0;  ///< voxels, of this image and earlier ones, that wait for another look
   std::size_t pending_free = 0;  ///< voxels that this image shows free, and no earlier one from another place
   std::size_t too_uncertain = 0;  ///< pixels whose sigma is above hit_max_relative_sigma
   std::size_t outside = 0;  ///< points beyond what the octree can address (32768 voxels from the origin)
@@ -102,12 +108,16 @@ class OccupancyMap {
   /// A map around an existing tree, for example one that was read from a file. The voxel size is the tree's.
   static Result<OccupancyMap> create(const MapOptions& options, std::unique_ptr<octomap::OcTree> tree);
 
+  /// @{
+  /// What was moved from can only be assigned to or destroyed.
   OccupancyMap(OccupancyMap&&) noexcept;
   OccupancyMap& operator=(OccupancyMap&&) noexcept;
+  /// @}
   OccupancyMap(const OccupancyMap&) = delete;
   OccupancyMap& operator=(const OccupancyMap&) = delete;
   ~OccupancyMap();
 
+  /// As given to create(), but for the voxel size of a tree that was read.
   [[nodiscard]] const MapOptions& options() const { return options_; }
 
   /// Fuses one depth image. Each voxel gets at most one hit or one miss. Same images in the same order, same
@@ -128,18 +138,21 @@ class OccupancyMap {
 
   /// State of the voxel that holds a point (world, m). Beyond what the octree can address: unknown.
   [[nodiscard]] Occupancy at(const Eigen::Vector3d& point) const;
-  /// Probability that it is occupied; NaN where unknown.
+  /// Probability that it is occupied; NaN if unknown.
   [[nodiscard]] double probability(const Eigen::Vector3d& point) const;
 
   /// Calls `visitor` for every known cell, in the order of the octree.
   void for_each(const std::function<void(const MapCell&, Occupancy)>& visitor) const;
   /// Occupied cells, in the order of the octree.
   [[nodiscard]] std::vector<MapCell> occupied() const;
-  /// Bounds of all known cells; empty where nothing is known.
+  /// Bounds of all known cells; empty if nothing is known.
   [[nodiscard]] Eigen::AlignedBox3d bounds() const;
+  /// Voxels that are known; a cube counts as all its voxels.
   struct Counts {
-    std::size_t occupied = 0, free = 0;  ///< voxels; a cube counts as all its voxels
+    std::size_t occupied = 0;  ///< of all known voxels, those that are occupied
+    std::size_t free = 0;      ///< the rest of them
   };
+  /// Counts the whole map: time proportional to its size.
   [[nodiscard]] Counts counts() const;
 
   /// For what OctoMap, dynamicEDT3D and FCL do with a tree.

@@ -23,7 +23,7 @@ class PendingHits {
   /// One look at a voxel; the first one of each view counts. Views are numbered, and those of different
   /// numbers are from different places.
   const Evidence& add(std::uint64_t code, float weight, float points, int view);
-  /// 0 where nothing waits.
+  /// 0 if nothing waits.
   [[nodiscard]] float weight(std::uint64_t code) const;
   void erase(std::uint64_t code) { voxels_.erase(code); }
   /// Drops what was seen last before this view.

@@ -22,10 +22,10 @@ struct RestMeans {
 std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const AlignmentOptions& options);
 
 /// Puts a filter at rest: level from the specific force, gyroscope bias from the rate, at a yaw (azimuth of
-/// the body's x axis, or of its y axis where x is near vertical) with its uncertainty.
+/// the body's x axis, or of its y axis if x is near vertical) with its uncertainty.
 void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw_sigma);
 
-/// Azimuth of the body's x axis (y where x is within 20° of the vertical), and its standard deviation.
+/// Azimuth of the body's x axis (y if x is within 20° of the vertical), and its standard deviation.
 struct Yaw {
   double angle = 0;
   double sigma = 0;

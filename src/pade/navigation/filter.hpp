@@ -92,7 +92,7 @@ class Filter {
   void propagate(Time to, const Vector3d& rate_mean, const Vector3d& force_mean, const Vector3d& rate_end);
   /// Learns the level of vibration from a sample that the state has been moved to.
   void observe(const ImuSample& sample) { core_.vibration.observe(sample, options_.gap); }
-  /// Adds the doubt that a gap of `duration` without samples leaves.
+  /// Adds the uncertainty that a gap of `duration` without samples leaves.
   void add_gap_noise(double duration);
 
   Innovation update(const GnssFix& fix);
@@ -110,7 +110,7 @@ class Filter {
   /// From now on the innovations are judged: `core().integrity` says whether the filter is lost.
   void watch() { core_.integrity.watching = true; }
 
-  /// Remembers the present pose; its index, or -1 where kMaxClones are taken.
+  /// Remembers the present pose; its index, or -1 if kMaxClones are taken.
   int clone();
   void drop_clones();
   [[nodiscard]] int clones() const { return clones_; }

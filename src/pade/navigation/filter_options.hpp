@@ -10,8 +10,13 @@
 
 namespace pade::navigation {
 
-enum class ImuClass { industrial, consumer };
+/// Which constants suit an IMU.
+enum class ImuClass {
+  industrial,  ///< tactical or industrial grade: the defaults
+  consumer,    ///< of a phone or a small autopilot
+};
 
+/// Noise, gates and floors of the filter (docs/navigation.md says where each number comes from).
 struct FilterOptions {
   double gravity = 9.80665;  ///< m/s², along world -z; the Earth's rate is below the noise of these sensors
 
@@ -58,6 +63,7 @@ struct FilterOptions {
   double reacquire_after = 1.0;  ///< seconds of nothing but rejections after which the sensor is believed
   double drift_bound = 42;       ///< of the drift of innovations, beyond which the covariance is refuted
 
+  /// The set of a class of IMU.
   static FilterOptions of(ImuClass imu);
 
   template <class Self, class Visitor>
@@ -130,7 +136,7 @@ struct AlignmentOptions {
 
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const FilterOptions& options);
-Status check(const AlignmentOptions& options);
+Status check(const AlignmentOptions& options);  ///< the same for those of the start
 
 }  // namespace pade::navigation
 

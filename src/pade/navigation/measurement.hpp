@@ -11,7 +11,7 @@ namespace pade::navigation {
 
 /// What became of a measurement.
 enum class Verdict : std::uint8_t {
-  accepted,
+  accepted,    ///< used as it is
   inflated,    ///< outside the gate, used with its noise enlarged so that it lies on the gate
   rejected,    ///< far outside
   reacquired,  ///< after a time of nothing but rejections: the state was opened for it and moved
@@ -20,17 +20,17 @@ enum class Verdict : std::uint8_t {
 
 /// Innovation of one measurement; unused components are zero.
 struct Innovation {
-  Verdict verdict = Verdict::unusable;
-  int size = 0;
-  Vector3d residual = Vector3d::Zero();
-  Vector3d sigma = Vector3d::Zero();  ///< predicted, before any inflation
-  Vector3d white = Vector3d::Zero();  ///< the residual in units of its predicted covariance, S^(-1/2) r
-  double chi_square = 0;
+  Verdict verdict = Verdict::unusable;   ///< what became of it
+  int size = 0;                          ///< components that are used, 0 to 3
+  Vector3d residual = Vector3d::Zero();  ///< measured less predicted, in the unit of the measurement
+  Vector3d sigma = Vector3d::Zero();     ///< predicted, before any inflation
+  Vector3d white = Vector3d::Zero();     ///< the residual in units of its predicted covariance, S^(-1/2) r
+  double chi_square = 0;      ///< squared Mahalanobis length of the residual: the gate is a bound on it
   double log_likelihood = 0;  ///< of the residual under its predicted covariance, without the constant
   double jump = 0;  ///< distance the position (or speed the velocity) moved in a re-acquisition, m or m/s
 };
 
-/// Also the order in which measurements of one stamp are used.
+/// Sensors; also the order in which measurements of one stamp are used.
 enum class SensorKind : std::uint8_t {
   gnss_velocity,
   gnss_position,
@@ -44,15 +44,17 @@ enum class SensorKind : std::uint8_t {
 
 /// A measurement of any kind.
 struct Measurement {
-  Time time;
-  SensorKind kind = SensorKind::gnss_position;
-  Vector3d value = Vector3d::Zero();           ///< scalar sensors use the first component
-  Matrix3d covariance = Matrix3d::Identity();  ///< GNSS only
-  double sigma = 0;                            ///< the others
-  double extra = 0;                            ///< ground height of a range
-  Innovation innovation;                       ///< of its last use by the live filter
+  Time time;                                    ///< of the measurement, less the sensor's latency
+  SensorKind kind = SensorKind::gnss_position;  ///< says what `value` is
+  Vector3d value = Vector3d::Zero();            ///< scalar sensors use the first component
+  Matrix3d covariance = Matrix3d::Identity();   ///< GNSS only
+  double sigma = 0;                             ///< the others
+  double extra = 0;                             ///< ground height of a range
+  Innovation innovation;                        ///< of its last use by the live filter
 
   Measurement() = default;
+  /// @{
+  /// From what the sensors deliver (core/sensors/measurements.hpp).
   explicit Measurement(const GnssFix& m) : time(m.time), value(m.position), covariance(m.covariance) {}
   explicit Measurement(const GnssVelocity& m)
       : time(m.time), kind(SensorKind::gnss_velocity), value(m.velocity), covariance(m.covariance) {}
@@ -67,6 +69,7 @@ struct Measurement {
   explicit Measurement(const RangeToGround& m)
       : time(m.time), kind(SensorKind::range), value(m.range, 0, 0), sigma(m.sigma), extra(m.ground_height) {}
   explicit Measurement(const RoadMotion& m) : time(m.time), kind(SensorKind::road), sigma(m.sigma) {}
+  /// @}
 };
 
 }  // namespace pade::navigation

@@ -66,7 +66,7 @@ inline Prediction<1> predict_barometric_height(const NavigationState& state) {
   return y;
 }
 
-/// Azimuth of a body vector `b`, from east towards north; none where it points straight up or down.
+/// Azimuth of a body vector `b`, from east towards north; none if it points straight up or down.
 inline std::optional<Prediction<1>> predict_azimuth(const NavigationState& state, const Vector3d& b) {
   const Matrix3d R = state.X.R.toRotationMatrix();
   const Vector3d w = R * b;
@@ -91,7 +91,7 @@ inline std::optional<Prediction<1>> predict_magnetic_azimuth(const NavigationSta
   return y;
 }
 
-/// Distance along body -z to level ground at height h: (p_z - h) / R_zz; none where the body is tilted over
+/// Distance along body -z to level ground at height h: (p_z - h) / R_zz; none if the body is tilted over
 /// 60°.
 inline std::optional<Prediction<1>> predict_range(const NavigationState& state, double ground_height) {
   const Matrix3d R = state.X.R.toRotationMatrix();

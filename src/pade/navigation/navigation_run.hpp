@@ -64,7 +64,7 @@ struct CameraTrajectory {
 /// each further one adds the relative motion read from clones, so that corrections of the absolute position
 /// never appear as motion (the price: the chain drifts from the GNSS by the integral of the velocity's
 /// error). A filter that has to start anew breaks the chain: `frames_left` counts what lies outside the
-/// longest. Without poses where no two neighbouring frames have an answer.
+/// longest. Without poses if no two neighbouring frames have an answer.
 /// @param T_body_camera  that of the run's options
 CameraTrajectory camera_trajectory(const NavigationRun& run, const Pose& T_body_camera);
 

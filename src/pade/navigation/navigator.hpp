@@ -20,9 +20,10 @@
 
 namespace pade::navigation {
 
+/// Options of Navigator: the vehicle's mounting and latencies, and what counts as good enough.
 struct NavigatorOptions {
-  FilterOptions filter;
-  AlignmentOptions alignment;
+  FilterOptions filter;                        ///< noise and gates
+  AlignmentOptions alignment;                  ///< the start
   Vector3d gnss_lever_arm = Vector3d::Zero();  ///< antenna in the body frame, m
   double gnss_position_latency = 0;            ///< subtracted from the stamps of sensors that stamp late, s
   double gnss_velocity_latency = 0;            ///< s
@@ -65,71 +66,83 @@ struct NavigatorOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const NavigatorOptions& options);
 
+/// How far the filter can be relied on.
 enum class NavigationStatus : std::uint8_t {
-  uninitialised,
-  levelled,   ///< attitude, and yaw with a standard deviation over 0.125 rad or not at all
-  yaw_known,  ///< no GNSS velocity has confirmed it yet
-  navigating,
+  uninitialised,   ///< nothing is known yet
+  levelled,        ///< attitude, and yaw with a standard deviation over 0.125 rad or not at all
+  yaw_known,       ///< no GNSS velocity has confirmed it yet
+  navigating,      ///< all is well
   dead_reckoning,  ///< no GNSS velocity for a while, or none that the positions do not contradict
   lost,            ///< the measurements refute the covariance: nothing here is to be relied on
 };
 
+/// How the filter is, and counts since its construction.
 struct Health {
-  NavigationStatus status = NavigationStatus::uninitialised;
-  double seconds_since_velocity = 0;  ///< since one passed its gate
-  double seconds_since_position = 0;
-  double yaw_sigma = 0;           ///< rad
-  std::uint64_t imu_refused = 0;  ///< not finite, or not later than the one before
-  std::uint64_t imu_gaps = 0;
+  NavigationStatus status = NavigationStatus::uninitialised;  ///< now
+  double seconds_since_velocity = 0;                          ///< since one passed its gate
+  double seconds_since_position = 0;                          ///< the same of GNSS positions
+  double yaw_sigma = 0;                                       ///< rad
+  std::uint64_t imu_refused = 0;         ///< not finite, or not later than the one before
+  std::uint64_t imu_gaps = 0;            ///< pairs of samples farther apart than FilterOptions::gap
   std::uint64_t too_late = 0;            ///< measurements older than the history
   std::uint64_t duplicates = 0;          ///< same sensor, same stamp
   std::uint64_t unusable = 0;            ///< not finite
   std::uint64_t restarts = 0;            ///< after a gap too long to bridge, or when lost for too long
   std::uint64_t restarts_when_lost = 0;  ///< of them, those of the second kind
-  std::uint64_t times_lost = 0;
-  std::uint64_t velocity_doubted = 0;  ///< times that the GNSS velocities contradicted the positions
+  std::uint64_t times_lost = 0;          ///< times that the status became `lost`
+  std::uint64_t velocity_doubted = 0;    ///< times that the GNSS velocities contradicted the positions
 };
 
 /// The answer to a question that cannot always be answered.
 enum class Answer : std::uint8_t {
-  valid,
-  not_initialised,
-  too_old,  ///< before the history
-  too_new,  ///< after the newest IMU sample
+  valid,            ///< there is an answer
+  not_initialised,  ///< the filter has not started yet
+  too_old,          ///< before the history
+  too_new,          ///< after the newest IMU sample
 };
 
+/// Motion of the camera between two times. Everything but `answer` and `status` has a meaning only if
+/// `answer` is valid.
 struct RelativePose {
-  Answer answer = Answer::not_initialised;
+  Answer answer = Answer::not_initialised;  ///< whether the question could be answered
   /// Reference: the camera at t1, other: at t2. Covariance as RelativeMotion has it.
   RelativeMotion motion;
-  bool scale_valid = false;      ///< the doubt of the baseline's length is small beside it
+  bool scale_valid = false;      ///< the baseline is long enough, given its uncertainty, to fix the scale
   bool direction_valid = false;  ///< so is that of its direction; says nothing about the length
-  NavigationStatus status = NavigationStatus::uninitialised;
+  NavigationStatus status = NavigationStatus::uninitialised;  ///< of the filter at t2
 };
 
+/// The state of the body at one time. Everything but `answer` has a meaning only if that is valid.
 struct AbsolutePose {
-  Answer answer = Answer::not_initialised;
-  Pose T_world_body;                       ///< global: jumps with corrections
-  Pose T_smooth_body;                      ///< without jumps; drifts towards the global one within seconds
-  Vector3d velocity = Vector3d::Zero();    ///< ENU, m/s
-  Matrix9d covariance = Matrix9d::Zero();  ///< of (φ, ν, ρ), body axes (filter_state.hpp)
+  Answer answer = Answer::not_initialised;  ///< whether the question could be answered
+  Pose T_world_body;                        ///< global: jumps with corrections
+  Pose T_smooth_body;                       ///< without jumps; drifts towards the global one within seconds
+  Vector3d velocity = Vector3d::Zero();     ///< ENU, m/s
+  Matrix9d covariance = Matrix9d::Zero();   ///< of (φ, ν, ρ), body axes (filter_state.hpp)
   Vector3d gyroscope_bias = Vector3d::Zero();      ///< rad/s
   Vector3d accelerometer_bias = Vector3d::Zero();  ///< m/s²
 };
 
+/// The GPS/INS filter: an invariant extended Kalman filter over a short history, so that late data and
+/// questions about the past are answered as if nothing had been late (docs/navigation.md).
 class Navigator {
  public:
   /// Refuses options that make no sense; the message names the option.
   static Result<Navigator> create(const NavigatorOptions& options);
   explicit Navigator(const NavigatorOptions& options);  ///< of options that check() accepts
+  /// @{
+  /// What was moved from can only be assigned to or destroyed.
   Navigator(Navigator&&) noexcept;
   Navigator& operator=(Navigator&&) noexcept;
+  /// @}
   ~Navigator();
 
-  // Each stamped at the moment of measurement (less the sensor's latency), in any order. Refused data is
-  // counted.
+  /// @{
+  /// A sample or a measurement, stamped at the moment of measurement, in any order. Data that cannot be used
+  /// is counted in health().
   void add(const ImuSample& sample);
   void add(const GnssFix& measurement);
   void add(const GnssVelocity& measurement);
@@ -139,6 +152,7 @@ class Navigator {
   void add(const ZeroVelocity& measurement);
   void add(const RangeToGround& measurement);
   void add(const RoadMotion& measurement);
+  /// @}
 
   /// Motion of the camera from image time t1 to image time t2 (t2 >= t1), from a clone at t1 within a replay
   /// that ends at t2: nothing stamped after t2 is used, however late the question comes.
@@ -146,6 +160,7 @@ class Navigator {
   /// The state at image time t, with what was measured until then.
   AbsolutePose absolute_pose(Time t);
 
+  /// As of the newest data.
   [[nodiscard]] Health health();
   [[nodiscard]] Time newest() const;  ///< of the IMU samples
   /// Called with each measurement when it leaves the history, with the innovation of its last use.

@@ -29,12 +29,12 @@ class TimeRing {
     --size_;
   }
   void pop_back() { --size_; }
-  /// Drops the oldest where there is no room.
+  /// Drops the oldest if there is no room.
   void push_back(const Item& item) {
     if (full()) pop_front();
     items_[(first_ + size_++) % items_.size()] = item;
   }
-  /// Puts the item at index `at`, behind those that are there already; drops the oldest where there is no
+  /// Puts the item at index `at`, behind those that are there already; drops the oldest if there is no
   /// room.
   void insert(std::size_t at, const Item& item) {
     if (full()) {

@@ -53,8 +53,10 @@ struct ViewsOptions {
     field("depth", self.depth, "depth from it");
   }
 };
+/// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const ViewsOptions& options);
 
+/// Options of ObstacleMapper: those of all stages, and how frames are paired.
 struct ObstacleMapperOptions {
   std::string flow = "clg-fast-half";
   depth::Derotation derotation = depth::Derotation::image;
@@ -107,56 +109,60 @@ ObstacleMapperOptions as_printed(ObstacleMapperOptions options = {});
 
 /// The stages of one frame, in order. `total` is the latency from add() to its return.
 enum class Stage { grey, derotate, flow, refine, depth, map, total };
+/// Of the stages, by their number: in `timing.json` and reports.
 inline constexpr std::array<std::string_view, 7> stage_names = {"grey",  "derotate", "flow", "refine",
                                                                 "depth", "map",      "total"};
 
 /// What one call of ObstacleMapper::add() did. A copy shares its images, which the next call writes over:
 /// clone what is to be kept.
 struct MapperUpdate {
+  /// What became of the frame.
   enum class Outcome {
     waiting,  ///< the frame was taken, but has no partner yet
     mapped,   ///< there is a depth image, and the map has it
     skipped,  ///< the frame was left out: `reason`
   };
-  Outcome outcome = Outcome::waiting;
-  std::string reason;
-  Frame reference;  ///< the frame of the depth image, grey; its pose is the refined one
+  Outcome outcome = Outcome::waiting;  ///< of this call; all else but `reason` is of the last frame mapped
+  std::string reason;                  ///< why the frame was skipped; else empty
+  Frame reference;                     ///< the frame of the depth image, grey; its pose is the refined one
   RelativeMotion
       motion;      ///< the farthest camera that the depth was read from, seen from the reference, refined
   int step = 0;    ///< frames between the two
   int views = 0;   ///< further frames that the depth was read from, together; 0 = from pairs
   FlowField flow;  ///< of the last pair, from the reference to the other image (derotated where derotate =
                    ///< image); with further views this is the pair of options.step
-  depth::RefinedMotion refinement;  ///< of the motion over `step` of the options, and how it was found
-  DepthImage depth;
-  depth::DepthDiagnostics diagnostics;
-  mapping::MapChange change;                         ///< what the depth image changed in the map
+  depth::RefinedMotion refinement;      ///< of the motion over `step` of the options, and how it was found
+  DepthImage depth;                     ///< of the reference: depth, variance, state, bound per pixel
+  depth::DepthDiagnostics diagnostics;  ///< of the (last) pair
+  mapping::MapChange change;            ///< what the depth image changed in the map
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
 };
 
 /// Counts of a flight so far.
 struct MapperHealth {
-  std::size_t frames = 0;  ///< calls of add()
-  std::size_t mapped = 0;
-  std::size_t skipped = 0;
+  std::size_t frames = 0;   ///< calls of add()
+  std::size_t mapped = 0;   ///< of them, those that gave a depth image
+  std::size_t skipped = 0;  ///< of them, those that could not be used
 };
 
 /// Obstacle mapping from one camera and its poses. Not thread-safe; nothing global, no files.
 class ObstacleMapper {
  public:
-  /// @param camera  Undistorted pinhole (Camera::undistorted(), images through Undistorter). @param valid
-  /// CV_8UC1 of its size, 0 where no frame sees anything (propeller, lens border); empty = all valid.
-  /// Error: an unknown flow method, or an option or camera that makes no sense.
+  /// @param camera   undistorted pinhole (Camera::undistorted(), images through Undistorter).
+  /// @param options  what check() accepts. @param valid  CV_8UC1 of its size, 0 where no frame sees anything
+  /// (propeller, lens border); empty = all valid. Error: an unknown flow method, or an option or camera that
+  /// makes no sense.
   static Result<ObstacleMapper> create(const Camera& camera, const ObstacleMapperOptions& options = {},
                                        const cv::Mat& valid = {});
 
   /// One frame of the flight. A frame that cannot be used (empty or of another size or type than the
   /// camera's, a pose that is not finite or not a rotation, not newer than the last) is skipped and counted;
   /// the flight goes on.
-  /// @param image  CV_8UC1 or CV_8UC3 (BGR), undistorted; copied. @param T_world_camera  pose at `time`.
+  /// @param image  CV_8UC1 or CV_8UC3 (BGR), undistorted; copied. @param time  when it was taken.
+  /// @param T_world_camera  pose at `time`.
   /// @return what was done; valid until the next call.
   /// @param motion_covariance  of the motion from the frame before (Frame::motion_covariance); zero = exact.
-  /// Where it is not zero, rotation and direction of the motion are refined by the images, and the map is
+  /// If it is not zero, rotation and direction of the motion are refined by the images, and the map is
   /// built on the chain of refined motions: T_world_camera().
   const MapperUpdate& add(const cv::Mat& image, Time time, const Pose& T_world_camera,
                           const Matrix6d& motion_covariance = Matrix6d::Zero());
@@ -164,10 +170,10 @@ class ObstacleMapper {
   /// Pose of the newest frame that was taken, in the map's world: as given, corrected by the images.
   [[nodiscard]] const Pose& T_world_camera() const { return recent_.back().frame.T_world_camera; }
 
-  [[nodiscard]] const ObstacleMapperOptions& options() const { return options_; }
-  [[nodiscard]] const Camera& camera() const { return camera_; }
-  [[nodiscard]] const MapperHealth& health() const { return health_; }
-  [[nodiscard]] const mapping::OccupancyMap& map() const { return map_; }
+  [[nodiscard]] const ObstacleMapperOptions& options() const { return options_; }  ///< as given
+  [[nodiscard]] const Camera& camera() const { return camera_; }                   ///< as given
+  [[nodiscard]] const MapperHealth& health() const { return health_; }             ///< counts so far
+  [[nodiscard]] const mapping::OccupancyMap& map() const { return map_; }          ///< as of the last frame
 
  private:
   /// A frame of the recent past, its pose refined.

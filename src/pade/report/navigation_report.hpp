@@ -1,5 +1,5 @@
 // The files of a navigation run: its poses and motions as tables, and one self-contained HTML page with plots
-// of the path, the errors where there is truth, innovations, and health.
+// of the path, the errors if there is truth, innovations, and health.
 #pragma once
 
 #include <optional>
@@ -16,7 +16,7 @@ std::string format_trajectory(const NavigationRun& run);
 /// the 6x6 covariance of translation and rotation vector, flags.
 std::string format_relative_motion(const NavigationRun& run);
 
-/// The motions of the body against `log.truth`; empty where no motion has a truth.
+/// The motions of the body against `log.truth`; empty if no motion has a truth.
 /// @param options  of the run
 std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
                                                        const NavigationRunOptions& options,

@@ -31,7 +31,7 @@ struct Report {
   io::RunTiming timing;
   std::optional<DepthAccuracy> accuracy;           ///< empty without truth
   std::vector<ReportFrame> frames;                 ///< a few, in the order of time
-  const mapping::OccupancyMap* map = nullptr;      ///< as the run left it; null where there is none
+  const mapping::OccupancyMap* map = nullptr;      ///< as the run left it; null if there is none
   std::vector<Eigen::Vector3d> trajectory;         ///< camera positions, world, metres, in the order of time
   Eigen::Vector3d look = Eigen::Vector3d::Zero();  ///< optical axis at the last of them, world
 };
@@ -39,7 +39,7 @@ struct Report {
 /// The page. Nothing in it but what the report says: the same input gives the same bytes.
 std::string to_html(const Report& report);
 
-/// `wanted` indices spread evenly over 0 .. count - 1, away from both ends: the frames to show. All where
+/// `wanted` indices spread evenly over 0 .. count - 1, away from both ends: the frames to show. All if
 /// there are fewer.
 std::vector<std::size_t> evenly_spread(std::size_t count, std::size_t wanted);
 

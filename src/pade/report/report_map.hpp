@@ -15,7 +15,7 @@ namespace pade::evaluation {
 struct MapLayout {
   double width = 640;  ///< across the page
   double half = 640;   ///< of two beside each other: views from above that are not much wider than high
-  bool turn = false;   ///< turns the views from above where they would be higher than wide
+  bool turn = false;   ///< turns the views from above if they would be higher than wide
 };
 
 /// The map with the camera's path over it.
@@ -28,7 +28,7 @@ struct MapScene {
 };
 
 /// An <svg> per view with axes in metres and a scale bar. Voxels beyond the 0.2 and 99.8 % quantile of each
-/// axis and away from the path are cut off, and counted. Empty where nothing is known or there is no path.
+/// axis and away from the path are cut off, and counted. Empty if nothing is known or there is no path.
 struct MapViews {
   std::string top;         ///< all obstacles seen from above, coloured by height
   std::string level;       ///< free, occupied and unknown at the height of the nearest point of the path
@@ -46,7 +46,7 @@ inline constexpr double corridor_length = 15;     ///< metres
 inline constexpr double corridor_half_width = 3;  ///< metres
 
 /// Two sections along the flight direction from the last pose on (corridor.hpp): free, occupied and unknown.
-/// Empty where there is no pose.
+/// Empty if there is no pose.
 struct CorridorViews {
   std::string level, upright;
   double reach = std::numeric_limits<double>::quiet_NaN();   ///< known_free_reach() of the sphere, metres

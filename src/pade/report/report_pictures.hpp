@@ -47,12 +47,12 @@ std::string png_uri(const cv::Mat& picture, int largest_width, bool smooth);
 /// The same as JPEG, for photographs.
 std::string jpeg_uri(const cv::Mat& picture, int largest_width);
 
-/// The file that such a URI holds; empty where it is none.
+/// The file that such a URI holds; empty if it is none.
 std::string bytes_of_uri(std::string_view uri);
 
 /// `value` rounded up to 1, 2 or 5 times a power of ten.
 double round_up_125(double value);
-/// The value that a share `quantile` of the finite values stays below; NaN where there are none.
+/// The value that a share `quantile` of the finite values stays below; NaN if there are none.
 double finite_quantile(const cv::Mat& values, double quantile);
 
 }  // namespace pade::evaluation

@@ -10,11 +10,11 @@
 
 namespace pade::evaluation {
 
-/// What evaluation.json of the run says; empty where there is none.
+/// What evaluation.json of the run says; empty if there is none.
 Result<std::optional<DepthAccuracy>> stored_accuracy(const io::Run& run);
 
 /// Compares the depth stack of a run with the true depth of its sequence, with the run's own range limit.
-/// Equal to stored_accuracy() up to the half count that the 16-bit images round. Error where the run has no
+/// Equal to stored_accuracy() up to the half count that the 16-bit images round. Error if the run has no
 /// depth stack, where the sequence has no truth or images of another size, or where a file cannot be read.
 Result<DepthAccuracy> evaluate_stack(const io::Run& run, const io::Sequence& sequence);
 

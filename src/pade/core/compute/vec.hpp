@@ -46,7 +46,7 @@ PADE_INLINE V ramp() {
 #endif
 }
 
-// min and max return the second operand where either is NaN, on every machine.
+// min and max return the second operand if either is NaN, on every machine.
 #if defined(__AVX512F__)
 // The plain intrinsics of GCC 12 pass an uninitialised operand, which its own warnings refuse.
 inline constexpr __mmask16 kAll = 0xffff;

@@ -31,7 +31,7 @@ class WorkerPool {
     work_ = &work;
     pending_.store(static_cast<int>(helpers_.size()), std::memory_order_relaxed);
     announce();
-    const Wait wait{*this};  // also where work(0) throws: until they are done, the helpers use `work`
+    const Wait wait{*this};  // also if work(0) throws: until they are done, the helpers use `work`
     work(0);
   }
 

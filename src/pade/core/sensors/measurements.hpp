@@ -10,7 +10,7 @@ namespace pade {
 
 /// One sample of a strapdown inertial measurement unit, at the body origin.
 struct ImuSample {
-  Time time;
+  Time time;  ///< of the measurement
   Eigen::Vector3d angular_rate =
       Eigen::Vector3d::Zero();  ///< of the body against the world, body axes, rad/s
   Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();  ///< acceleration minus gravity, body axes, m/s²
@@ -18,54 +18,54 @@ struct ImuSample {
 
 /// A GNSS position of the antenna.
 struct GnssFix {
-  Time time;
+  Time time;                                                 ///< of the measurement
   Eigen::Vector3d position = Eigen::Vector3d::Zero();        ///< antenna, ENU, m
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< total error as the receiver reports it, m²
 };
 
 /// A GNSS velocity of the antenna (from Doppler or carrier differences); it has its own stamp.
 struct GnssVelocity {
-  Time time;
+  Time time;                                                 ///< of the measurement
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();        ///< antenna, ENU, m/s
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< (m/s)²
 };
 
 /// A barometric height above an unknown, slowly drifting zero.
 struct BarometricHeight {
-  Time time;
+  Time time;          ///< of the measurement
   double height = 0;  ///< up, m
   double sigma = 1;   ///< white part, m
 };
 
 /// The Earth's magnetic field in body axes.
 struct MagneticField {
-  Time time;
+  Time time;                                        ///< of the measurement
   Eigen::Vector3d field = Eigen::Vector3d::Zero();  ///< body axes, any unit
   double sigma = 0.006;  ///< white part per axis, as a fraction of the field's norm
 };
 
 /// The yaw of the body: angle of its x axis from east, towards north.
 struct Heading {
-  Time time;
+  Time time;           ///< of the measurement
   double yaw = 0;      ///< rad
   double sigma = 0.1;  ///< rad
 };
 
 /// The vehicle is known to stand still.
 struct ZeroVelocity {
-  Time time;
+  Time time;            ///< of the measurement
   double sigma = 0.02;  ///< per axis, m/s
 };
 
 /// A vehicle on wheels moves along its x axis: no part of the velocity points to its side or off the road.
 struct RoadMotion {
-  Time time;
+  Time time;           ///< of the measurement
   double sigma = 0.2;  ///< per axis, m/s; what the wheels slip and the springs move
 };
 
 /// Distance along body -z to level ground.
 struct RangeToGround {
-  Time time;
+  Time time;                 ///< of the measurement
   double range = 0;          ///< m
   double sigma = 0.05;       ///< m
   double ground_height = 0;  ///< of the ground below, ENU, m

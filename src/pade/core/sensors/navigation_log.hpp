@@ -29,7 +29,7 @@ struct GnssLog {
   std::vector<GnssFix> fixes;
   std::vector<GnssVelocity> velocities;
   std::optional<GeodeticOrigin> origin;
-  std::optional<Eigen::Vector3d> lever_arm;  ///< antenna in the body frame (FLU), where the file says so
+  std::optional<Eigen::Vector3d> lever_arm;  ///< antenna in the body frame (FLU), if the file says so
 };
 
 /// What a log folder holds. Rows are in the order of the files: stamps may repeat or go back.
@@ -38,7 +38,7 @@ struct NavigationLog {
   GnssLog gnss;
   std::vector<BarometricHeight> barometer;
   std::vector<MagneticField> magnetometer;
-  std::vector<TrueState> truth;      ///< empty where there is none
+  std::vector<TrueState> truth;      ///< empty if there is none
   std::vector<std::string> remarks;  ///< rows left out, values filled in: one sentence each
 };
 

@@ -18,10 +18,12 @@ class CommonError {
  public:
   /// Exact motions.
   CommonError() = default;
+  /// @param camera  undistorted pinhole of all frames.
   /// @param views  their motions as seen from the reference, with covariances. @param largest_parallax  px,
   /// over which a view is not used for a point
   CommonError(const Camera& camera, const std::vector<RelativeMotion>& views, double largest_parallax);
 
+  /// True if no motion has an error: the variance is zero everywhere.
   [[nodiscard]] bool is_exact() const { return cells_.empty(); }
   /// Variance of the inverse depth `rho` (1/m) of pixel (u, v), 1/m^2; as it is in the middle of the pixel's
   /// cell, 4 x 4.

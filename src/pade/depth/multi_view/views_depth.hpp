@@ -14,6 +14,7 @@
 
 namespace pade::depth {
 
+/// Options of start_of_views() and read_views().
 struct ViewsDepthOptions {
   double sigma_scale = 0.75;
   double relative_sigma = 0.001;
@@ -28,26 +29,34 @@ struct ViewsDepthOptions {
           "depths of the last frame are a start where they agree with the new ones within this share");
   }
 };
+/// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const ViewsDepthOptions& options);
 
 /// Inverse depth of every pixel of a frame, whether or not it is published.
 struct InverseDepthImage {
-  Pose T_world_camera;
-  cv::Mat rho;  ///< CV_32FC1, 1/m; <= 0 = at infinity; empty = none
+  Pose T_world_camera;  ///< of the frame
+  cv::Mat rho;          ///< CV_32FC1, 1/m; <= 0 = at infinity; empty = none
+  /// True if there is no such image.
   [[nodiscard]] bool empty() const { return rho.empty(); }
 };
 
 /// Where the search of several views starts: the depth of a pair of frames, published or as its flow has it,
 /// and in its place what the last frame has found, where the two agree (within `agreement`, or 3 px over a
 /// baseline of `baseline` metres): then the search goes on where it has ended.
-/// @param two_view  depth image of the pair, window 1. @param flow  its derotated flow, px. @param motion its
-/// motion. @param T_world_camera  of its reference. @return CV_32FC1, 1/m, finite.
+/// @param two_view  depth image of the pair, window 1. @param flow  its derotated flow, px.
+/// @param camera    undistorted pinhole. @param motion  that of the pair.
+/// @param T_world_camera  of its reference. @param last  what the last frame has found; empty = nothing.
+/// @param baseline  metres. @param options  `agreement`.
+/// @return CV_32FC1, 1/m, finite.
 cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Camera& camera,
                        const RelativeMotion& motion, const Pose& T_world_camera,
                        const InverseDepthImage& last, double baseline, const ViewsDepthOptions& options);
 
 /// Puts what several views say in place of what two say, where they say anything.
-/// @param field  their parallax. @param scale  d = scale / Z, px m. @param common  what their motions err.
+/// @param field    their parallax. @param scale  d = scale / Z, px m.
+/// @param depth    range, gates and bounds. @param options  how sigma is read.
+/// @param image    in: what two views say, window 1; out: what all say. @param common  what their motions
+/// err.
 void read_views(const ParallaxField& field, double scale, const CommonError& common,
                 const DepthOptions& depth, const ViewsDepthOptions& options, DepthImage& image);
 

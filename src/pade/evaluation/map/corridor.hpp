@@ -13,10 +13,10 @@ namespace pade::evaluation {
 /// Where a flight ends and where it goes there.
 struct FlightEnd {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();   ///< world, metres
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< unit vector, world; zero where nobody knows
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< unit vector, world; zero if nobody knows
 };
 
-/// The direction is that of the last half metre of the path; where the path is shorter than 10 cm, that of
+/// The direction is that of the last half metre of the path; if the path is shorter than 10 cm, that of
 /// `look`, the camera's optical axis.
 /// @param path  camera positions, world, metres, in order of time, at least one
 FlightEnd end_of_flight(const std::vector<Eigen::Vector3d>& path, const Eigen::Vector3d& look);
@@ -24,7 +24,7 @@ FlightEnd end_of_flight(const std::vector<Eigen::Vector3d>& path, const Eigen::V
 /// How far a sphere gets, and what it meets there.
 struct FreeReach {
   double distance = 0;                                       ///< of its centre from the start, metres
-  mapping::Occupancy stopped_by = mapping::Occupancy::free;  ///< free where nothing stops it
+  mapping::Occupancy stopped_by = mapping::Occupancy::free;  ///< free if nothing stops it
 };
 
 /// How far the centre of a sphere can go straight on from `from`, until the sphere first meets a voxel that

@@ -51,8 +51,8 @@ struct SurfaceShares {
 };
 /// @param voxels  that hold the surface. Where it lies on a face, no point of it more than a millimetre
 /// inside of the
-///                voxel, either voxel of the face may hold it: together they are occupied where one is, and
-///                free where both are. (Else rounding would decide about a floor at z = 0.)
+///                voxel, either voxel of the face may hold it: together they are occupied if one is, and
+///                free if both are. (Else rounding would decide about a floor at z = 0.)
 SurfaceShares surface_shares(const mapping::OccupancyMap& map, const std::vector<Voxel>& voxels,
                              const PlacedSurface& surface);
 

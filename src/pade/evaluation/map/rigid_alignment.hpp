@@ -9,7 +9,7 @@
 namespace pade::evaluation {
 
 struct RigidAlignment {
-  Pose T_map_world;  ///< maps true poses to those of the map; the identity where they agree to 1 um
+  Pose T_map_world;  ///< maps true poses to those of the map; the identity if they agree to 1 um
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< of the middle of the true path, metres
   double rotation = 0;                              ///< angle, rad
   double rms_position = 0;                          ///< what is left of the positions, metres
@@ -26,7 +26,7 @@ inline constexpr double alignment_lever = 4;
 /// T_x_camera. Of empty lists: the identity.
 RigidAlignment align(const std::vector<Pose>& T_map_camera, const std::vector<Pose>& T_world_camera);
 
-/// T_map_world of one camera; the identity where the two poses agree to a micrometre and a microradian.
+/// T_map_world of one camera; the identity if the two poses agree to a micrometre and a microradian.
 Pose registration(const Pose& T_map_camera, const Pose& T_world_camera);
 
 }  // namespace pade::evaluation

@@ -12,7 +12,7 @@ namespace pade::evaluation {
 /// Three corners, metres.
 using Triangle = std::array<Eigen::Vector3d, 3>;
 
-/// True where a point of the triangle lies in the box. The box is half open, as a voxel is: its lower faces
+/// True if a point of the triangle lies in the box. The box is half open, as a voxel is: its lower faces
 /// belong to it and its upper ones do not, so that a wall on a face between two voxels lies in one of them.
 /// Separating axes: T. Akenine-Moeller, "Fast 3D triangle-box overlap testing", 2001.
 bool overlaps(const Triangle& triangle, const Eigen::AlignedBox3d& box);
@@ -21,7 +21,7 @@ bool overlaps(const Triangle& triangle, const Eigen::AlignedBox3d& box);
 /// 5.1.5).
 double distance(const Triangle& triangle, const Eigen::Vector3d& point);
 
-/// Distance between the nearest points of the triangle and the (closed, solid) box; 0 where they meet.
+/// Distance between the nearest points of the triangle and the (closed, solid) box; 0 if they meet.
 double distance(const Triangle& triangle, const Eigen::AlignedBox3d& box);
 
 }  // namespace pade::evaluation

@@ -17,11 +17,12 @@ namespace pade::flow {
 /// at H p~ + d e, homogeneous. With K (R p_ray + t / Z): H = K R K^-1, e = K t per unit of d. Whoever knows
 /// the poses computes them; this room does not.
 struct View {
-  cv::Mat image;  ///< CV_8UC1 of the reference's size
-  cv::Matx33f H = cv::Matx33f::eye();
-  cv::Vec3f e;
+  cv::Mat image;                       ///< CV_8UC1 of the reference's size
+  cv::Matx33f H = cv::Matx33f::eye();  ///< where the points at infinity are seen, pixels to pixels
+  cv::Vec3f e;                         ///< what a unit of d adds, homogeneous pixels
 };
 
+/// Options of MultiViewEstimator.
 struct MultiViewOptions {
   int reach = 5;
   double switching = 0.9;
@@ -64,9 +65,13 @@ Status check(const MultiViewOptions& options);
 /// Keeps buffers between calls: one per thread.
 class MultiViewEstimator {
  public:
+  /// Of options that check() accepts.
   explicit MultiViewEstimator(const MultiViewOptions& options = {});
+  /// @{
+  /// What was moved from can only be assigned to or destroyed.
   MultiViewEstimator(MultiViewEstimator&&) noexcept;
   MultiViewEstimator& operator=(MultiViewEstimator&&) noexcept;
+  /// @}
   ~MultiViewEstimator();
 
   /// @param reference  CV_8UC1. @param views  of its size.

@@ -11,7 +11,7 @@ namespace pade::flow {
 /// The lines and the flow on them, at one pyramid level: w = base + distance * direction, all in pixels.
 struct EpipolarLevel {
   PlaneView base_u, base_v;            ///< flow of a point at infinity
-  PlaneView direction_x, direction_y;  ///< unit vector, or zero where the line is not defined
+  PlaneView direction_x, direction_y;  ///< unit vector, or zero if the line is not defined
 };
 
 struct EpipolarLucasKanade {

@@ -22,7 +22,7 @@ struct FarnebackOptions {
   int coarse_median = 5;         ///< size of the median filter after each coarser level: 0, 3 or 5
 };
 
-/// What suits half resolution, where an iteration costs a quarter.
+/// What suits half resolution: an iteration costs a quarter there.
 FarnebackOptions farneback_half_options();
 
 /// Two-frame motion from polynomial expansion (Farneback 2003).

@@ -22,7 +22,7 @@ struct LucasKanadeOptions {
   int coarse_median = 5;
 };
 
-/// What suits half resolution, where an iteration costs a quarter.
+/// What suits half resolution: an iteration costs a quarter there.
 LucasKanadeOptions lucas_kanade_half_options();
 
 /// Lucas-Kanade in the FOLKI form (Le Besnerais and Champagnat 2005; Plyer et al. 2016).

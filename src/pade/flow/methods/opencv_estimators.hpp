@@ -1,4 +1,4 @@
-// OpenCV's dense flow methods behind our interface: comparators, and the default until our own are here.
+// OpenCV's dense flow methods behind our interface, to compare ours with.
 #pragma once
 
 #include <memory>

@@ -36,7 +36,7 @@ class PyramidFlow : public FlowEstimator {
   [[nodiscard]] const PlaneView& image(int slot, int level) const {
     return pyramids_[static_cast<std::size_t>(slot)].levels[static_cast<std::size_t>(level)].view();
   }
-  /// 0 where a pixel of the first image has no weight; data null where all have.
+  /// 0 where a pixel of the first image has no weight; data null if all have.
   [[nodiscard]] PlaneView mask(int level) const;
   [[nodiscard]] int level_count() const { return count_; }
   [[nodiscard]] bool started_fine() const { return coarsest_ < count_ - 1; }

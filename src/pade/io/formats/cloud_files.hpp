@@ -14,7 +14,7 @@ namespace pade::io {
 
 /// Vertices with x y z (float, metres), red green blue (uchar) and sigma (float, metres), as MeshLab,
 /// CloudCompare and Open3D read them. `comment` lines (split at newlines) say what the frame is.
-/// @param shift  where given, it is added to the points, and x y z are doubles: no digit is lost
+/// @param shift  if given, it is added to the points, and x y z are doubles: no digit is lost
 std::string encode_ply(const PointCloud& cloud, std::string_view comment = {},
                        const std::optional<Eigen::Vector3d>& shift = {});
 /// Fields x y z rgb sigma; rgb is packed into a float as PCL does. Comment lines and shift as above.

@@ -14,6 +14,7 @@
 
 namespace pade::io {
 
+/// Of a map file, by its extension.
 enum class MapFormat {
   bt,  ///< one of free, occupied, unknown per voxel
   ot,  ///< log-odds per voxel
@@ -42,12 +43,12 @@ std::filesystem::path side_car_of(const std::filesystem::path& map_file);
 /// `local_origin` is RunInfo::local_origin: the point of the pose world that is 0 0 0 of the map.
 std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin,
                             const Eigen::Vector3d& local_origin = Eigen::Vector3d::Zero());
-/// The geographic origin in a side-car; empty where it is not known there.
+/// The geographic origin in a side-car; empty if it is not known there.
 Result<std::optional<GeographicOrigin>> decode_side_car(std::string_view content, std::string_view file);
-/// The local origin in a side-car; zero where it has none.
+/// The local origin in a side-car; zero if it has none.
 Result<Eigen::Vector3d> decode_local_origin(std::string_view content, std::string_view file);
 
-/// The local origin beside a map file; zero where there is no side-car, or none in it.
+/// The local origin beside a map file; zero if there is no side-car, or none in it.
 Eigen::Vector3d local_origin_of(const std::filesystem::path& map_file);
 
 }  // namespace pade::io

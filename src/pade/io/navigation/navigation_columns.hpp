@@ -43,7 +43,7 @@ struct Triple {
 /// The names of three columns in one dialect.
 using TripleNames = std::array<std::string_view, 3>;
 
-/// The columns of these names; empty where one lacks.
+/// The columns of these names; empty if one lacks.
 std::optional<Triple> find_triple(const NumericTable& table, const TripleNames& names);
 /// The first of `candidates` that the table has, and which.
 struct FoundTriple {
@@ -52,7 +52,7 @@ struct FoundTriple {
 };
 std::optional<FoundTriple> find_triple(const NumericTable& table, std::span<const TripleNames> candidates);
 
-/// Says how many rows were left out, where there are any.
+/// Says how many rows were left out, if any were.
 void remark_left_out(const NumericTable& table, std::size_t left_out, std::vector<std::string>& remarks);
 
 }  // namespace pade::io

@@ -17,7 +17,7 @@ namespace pade::io {
 /// A column as its heading names it: "w_RS_S_x [rad s^-1]" is w_rs_s_x in rad s^-1.
 struct ColumnName {
   std::string name;  ///< lower case, without its unit
-  std::string unit;  ///< lower case, without blanks; empty where the heading gives none
+  std::string unit;  ///< lower case, without blanks; empty if the heading gives none
 };
 
 /// Rows of numbers under named columns. Fields that are not numbers (empty, "nan", a list of satellites) are
@@ -25,7 +25,7 @@ struct ColumnName {
 struct NumericTable {
   std::string name;                      ///< of the file, for messages
   std::string comment;                   ///< text of all lines that start with '#', joined by a space
-  std::vector<ColumnName> columns;       ///< empty where no heading was found
+  std::vector<ColumnName> columns;       ///< empty if no heading was found
   std::vector<double> values;            ///< row-major, rows() x width()
   std::vector<std::string_view> stamps;  ///< the field of each row in `stamp_column` as text (into the input)
   std::size_t stamp_column = 0;          ///< the first column whose name is one of time; else the first
@@ -53,13 +53,13 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name);
 
 /// What a dialect knows of its stamps beyond what the heading says.
 struct StampRule {
-  std::optional<TimeUnit> unit = {};       ///< where the dialect fixes one
+  std::optional<TimeUnit> unit = {};       ///< if the dialect fixes one
   std::optional<std::size_t> column = {};  ///< another column than stamp_column
   double slowest = 2;                      ///< longest usual step, s
 };
 
-/// The times of all rows (empty where a stamp cannot be read), in the unit that heading or dialect state,
-/// else in the one that the steps fit. Appends a remark where it had to be guessed and is not seconds.
+/// The times of all rows (empty if a stamp cannot be read), in the unit that heading or dialect state,
+/// else in the one that the steps fit. Appends a remark if it had to be guessed and is not seconds.
 /// Errors: a stated unit that the steps contradict.
 Result<std::vector<std::optional<Time>>> times_of(const NumericTable& table, const StampRule& rule,
                                                   std::vector<std::string>& remarks);

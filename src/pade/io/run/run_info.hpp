@@ -62,7 +62,7 @@ struct RunInfo {
   int window = 1;                  ///< n: one depth per n x n pixels (the stacks have full size all the same)
   double range_limit = 0;          ///< metres; depth beyond is none. 0 = no limit
   RunHealth health;
-  std::optional<WorldUp> world_up;         ///< empty where nobody said and the cameras do not agree
+  std::optional<WorldUp> world_up;         ///< empty if nobody said and the cameras do not agree
   std::optional<GeographicOrigin> origin;  ///< of the pose world
   /// The point of the pose world that is 0 0 0 of this run (Sequence::local_origin): add it to what the run
   /// holds to get back to the coordinates of the poses. Metres.
@@ -70,7 +70,7 @@ struct RunInfo {
   std::optional<MapSummary> map;
   MotionSummary motion;
   double masked_share = 0;  ///< of the image: mask and lens
-  std::vector<Hint> hints;  ///< worst first; none where all is well
+  std::vector<Hint> hints;  ///< worst first; none if all is well
 
   // Filled by RunWriter.
   double depth_scale = 0;           ///< counts per metre of depth/<time>.png

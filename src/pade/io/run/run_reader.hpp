@@ -20,8 +20,8 @@ namespace pade::io {
 struct Run {
   std::filesystem::path folder;
   RunInfo info;
-  RunTiming timing;               ///< without stages where timing.json is missing
-  std::vector<Time> depth_times;  ///< of the depth stack, ascending; empty where it was not saved
+  RunTiming timing;               ///< without stages if timing.json is missing
+  std::vector<Time> depth_times;  ///< of the depth stack, ascending; empty if it was not saved
 
   [[nodiscard]] bool has(std::string_view file) const { return std::filesystem::exists(folder / file); }
 };

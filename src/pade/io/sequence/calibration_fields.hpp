@@ -33,7 +33,7 @@ class CalibrationFields {
   const Yaml* find(std::initializer_list<std::string_view> names);
   bool has(std::string_view name) { return find({name}) != nullptr; }
 
-  /// A finite number; empty where the field is missing or wrong.
+  /// A finite number; empty if the field is missing or wrong.
   std::optional<double> number(std::string_view name);
   std::optional<double> positive(std::string_view name, std::string_view meaning);
   std::optional<int> pixels(std::initializer_list<std::string_view> names, std::string_view meaning);
@@ -48,7 +48,7 @@ class CalibrationFields {
   /// "dist_coeffs"); the first of `names` where there is none.
   [[nodiscard]] std::string spelled(std::initializer_list<std::string_view> names) const;
 
-  /// Complains where none of the names is present.
+  /// Complains if none of the names is present.
   void require(std::initializer_list<std::string_view> names, std::string_view expected);
   /// Complains about a field.
   void wrong(const Yaml& node, std::string_view name, std::string_view expected);

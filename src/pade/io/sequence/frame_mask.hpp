@@ -21,7 +21,7 @@ cv::Mat black_in_every_image(const std::vector<std::filesystem::path>& files, cv
 cv::Mat undistorted_mask(const cv::Mat& recorded, bool grow_recorded, const Camera& camera,
                          const Undistorter& undistorter, int radius);
 
-/// mask.png: every value but 0 is valid. Error where it cannot be read or has another size.
+/// mask.png: every value but 0 is valid. Error if it cannot be read or has another size.
 Result<cv::Mat> read_mask(const std::filesystem::path& file, cv::Size size);
 
 }  // namespace pade::io

@@ -17,12 +17,12 @@ struct ImageInfo {
   int channels = 1;  ///< as read by read_image: 1 or 3
 };
 
-/// Reads only the head and the tail of PNG, JPEG and binary PGM/PPM files (others are decoded). Error where
+/// Reads only the head and the tail of PNG, JPEG and binary PGM/PPM files (others are decoded). Error if
 /// the file is missing, empty, of no known format or cut short.
 Result<ImageInfo> inspect_image(const std::filesystem::path& path);
 
 /// The image as stored: 8, 16 or 32 bit, 1 or 3 (BGR) channels, transparency dropped, EXIF orientation
-/// ignored (a calibration belongs to the sensor's pixels). Error where the file is missing, empty, cut short
+/// ignored (a calibration belongs to the sensor's pixels). Error if the file is missing, empty, cut short
 /// or corrupt: the checksums of PNG are verified.
 Result<cv::Mat> read_image(const std::filesystem::path& path);
 

@@ -13,10 +13,10 @@
 namespace pade::io {
 
 /// The direction that points up, guessed from the cameras (T_world_camera, metres):
-/// - where the positions lie on the Earth's surface in earth-centred coordinates, away from its centre;
-/// - where the cameras look the same way but turn about it, as down-looking ones do, against their look;
+/// - if the positions lie on the Earth's surface in earth-centred coordinates, away from its centre;
+/// - if the cameras look the same way but turn about it, as down-looking ones do, against their look;
 /// - else the axis nearest to the mean of the cameras' up axes.
-/// Empty where the cameras have no common direction, and where they move along their own vertical axis and
+/// Empty if the cameras have no common direction, and if they move along their own vertical axis and
 /// never turn: a camera that looks down in straight flight and one that looks ahead on the way up are the
 /// same.
 std::optional<WorldUp> guess_up(std::span<const Pose> cameras);
@@ -32,7 +32,7 @@ std::string why_no_up(std::span<const Pose> cameras);
 Eigen::Vector3d near_flight(std::span<const Pose> cameras);
 
 /// What SequenceOptions::origin asks for: the point of the pose world that becomes 0 0 0. With "auto"
-/// near_flight() where that is farther than 1 km from 0 0 0 in any axis, else zero.
+/// near_flight() if that is farther than 1 km from 0 0 0 in any axis, else zero.
 Eigen::Vector3d chosen_origin(const std::string& origin, std::span<const Pose> cameras);
 
 }  // namespace pade::io

@@ -42,10 +42,9 @@ struct SequenceOptions {
     field("calibration", self.calibration, "calibration file to use instead of the sequence's own");
     field("world_up", self.world_up,
           "direction of the pose world that points up: +x, -x, +y, -y, +z, -z or \"x y z\"");
-    field(
-        "origin", self.origin,
-        "point of the pose world that becomes 0 0 0 of the run: auto (a point near the flight where that is "
-        "farther than 1 km from 0 0 0), flight (always a point near the flight), none, or \"x y z\"");
+    field("origin", self.origin,
+          "point of the pose world that becomes 0 0 0 of the run: auto (a point near the flight if that is "
+          "farther than 1 km from 0 0 0), flight (always a point near the flight), none, or \"x y z\"");
     field("camera", self.camera, "which camera of a calibration file that holds several, from 0");
     field("largest_pose_gap", self.largest_pose_gap,
           "poses are interpolated between rows at most this far apart, s");
@@ -78,7 +77,7 @@ class Sequence {
   /// checked, and a few images are decoded for the mask and the intensity scaling. Refused: folder,
   /// calibration or poses that are unusable as a whole, fewer than 2 usable frames, more than half of the
   /// frames bad, and, with `strict`, anything skipped.
-  /// @param source  where given, the poses come from it, and `options.poses` is but its name.
+  /// @param source  if given, the poses come from it, and `options.poses` is but its name.
   static Result<Sequence> open(const std::filesystem::path& folder, const SequenceOptions& options = {},
                                const PoseSource& source = {});
 
@@ -95,16 +94,16 @@ class Sequence {
   /// local_origin() subtracted.
   [[nodiscard]] const Pose& pose(std::size_t i) const;
 
-  /// Frame i: 8 bit grey or BGR, undistorted. Error where the pixels cannot be decoded; the caller skips it,
+  /// Frame i: 8 bit grey or BGR, undistorted. Error if the pixels cannot be decoded; the caller skips it,
   /// counts it, and asks check() whether to go on.
   [[nodiscard]] Result<Frame> frame(std::size_t i) const;
 
   [[nodiscard]] bool has_truth() const;
   /// True depth of frame i on the grid of the undistorted image: CV_32FC1, metres along the optical axis, NaN
-  /// = none. Error where no depth image is near in time or it cannot be read.
+  /// = none. Error if no depth image is near in time or it cannot be read.
   [[nodiscard]] Result<cv::Mat> truth(std::size_t i) const;
 
-  /// Whether the run may count as good after `undecodable` errors of frame(): an error where then more than
+  /// Whether the run may count as good after `undecodable` errors of frame(): an error if then more than
   /// half of all frames are bad, fewer than 2 are left, or options().strict and there is any.
   [[nodiscard]] Status check(std::size_t undecodable) const;
 
@@ -112,7 +111,7 @@ class Sequence {
   [[nodiscard]] const Camera& camera() const;
   /// The camera as calibrated, with its distortion.
   [[nodiscard]] const Camera& raw_camera() const;
-  /// CV_8UC1 on the grid of the undistorted image: 255 = valid. mask.png where there is one, else without the
+  /// CV_8UC1 on the grid of the undistorted image: 255 = valid. mask.png if there is one, else without the
   /// pixels that are 0 in every frame; without what lies outside the lens. Never empty.
   [[nodiscard]] const cv::Mat& mask() const;
 
@@ -121,12 +120,12 @@ class Sequence {
   [[nodiscard]] const std::filesystem::path& pose_file() const;
   [[nodiscard]] const SequenceOptions& options() const;
   [[nodiscard]] const IntensityScaling& intensity() const;
-  /// Where nothing is stated, the axis nearest to the mean of the cameras' up axes; empty where they have no
+  /// Where nothing is stated, the axis nearest to the mean of the cameras' up axes; empty if they have no
   /// common direction.
   [[nodiscard]] const std::optional<WorldUp>& world_up() const;
   [[nodiscard]] const std::optional<GeographicOrigin>& origin() const;
   /// The point of the pose world that is 0 0 0 of pose() and of everything made from it, metres: whole
-  /// numbers chosen by SequenceOptions::origin, zero where nothing is shifted. What is made in single
+  /// numbers chosen by SequenceOptions::origin, zero if nothing is shifted. What is made in single
   /// precision (clouds, the octree) would lose centimetres to decimetres in map coordinates such as UTM, or
   /// all.
   [[nodiscard]] const Eigen::Vector3d& local_origin() const;

@@ -33,7 +33,7 @@ class Trajectory {
   [[nodiscard]] bool empty() const { return rows_.empty(); }
 
   /// Pose at `time`, at constant body velocity on SE(3) between the two rows around it. A row within a
-  /// microsecond (the resolution of stamps in text files) is taken as it is. Error where `time` lies outside
+  /// microsecond (the resolution of stamps in text files) is taken as it is. Error if `time` lies outside
   /// the rows (nothing is extrapolated) or between rows more than `largest_gap` seconds apart.
   [[nodiscard]] Result<Pose> at(Time time, double largest_gap) const;
 
@@ -49,13 +49,13 @@ class TrajectoryBuilder {
  public:
   explicit TrajectoryBuilder(std::string file) : file_(std::move(file)) {}
 
-  /// A row as read: metres, and a quaternion x y z w. Skipped where a number is not finite, the quaternion is
+  /// A row as read: metres, and a quaternion x y z w. Skipped if a number is not finite, the quaternion is
   /// zero or its norm is more than 1 % from 1, or the time was seen before.
   void add(std::size_t line, Time time, const Eigen::Vector3d& translation, const Eigen::Vector4d& xyzw);
   /// A row that could not even be read.
   void skip(std::size_t line, const std::string& reason);
 
-  /// The trajectory of the good rows. Error where there are none. Appends to `report`.
+  /// The trajectory of the good rows. Error if there are none. Appends to `report`.
   Result<Trajectory> finish(ReadReport& report);
 
  private:

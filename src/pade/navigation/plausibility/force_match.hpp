@@ -32,7 +32,7 @@ class ForceMatch {
   /// Looks at the first minutes of the log.
   ForceMatch(const NavigationLog& log, const Reading& reading);
 
-  /// Root mean square of what is left over, m/s², with the velocities `lag` seconds late. Infinite where the
+  /// Root mean square of what is left over, m/s², with the velocities `lag` seconds late. Infinite if the
   /// log holds too little: fewer than two windows with velocities and IMU.
   [[nodiscard]] double misfit(double lag = 0) const;
 

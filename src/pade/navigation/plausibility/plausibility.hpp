@@ -34,8 +34,8 @@ namespace pade::navigation {
 std::vector<Hint> check_log(const NavigationLog& log);
 
 /// Stamps of an IMU that jitter, repeat or swap (a clock of milliseconds, samples that arrive in packets) put
-/// on straight lines between gaps, in place. Nothing happens where they rise, and where a clock was set back.
-/// The hint says what was done; empty where nothing was.
+/// on straight lines between gaps, in place. Nothing happens if they rise, or if a clock was set back.
+/// The hint says what was done; empty if nothing was.
 std::optional<Hint> regularise_stamps(std::vector<ImuSample>& samples);
 
 /// What the filter made of one sensor.

@@ -12,7 +12,7 @@
 
 namespace pade::experiment {
 
-/// The job of figure 4 where it is asked for: the sequence "approach", else the first.
+/// The job of figure 4 if it is asked for: the sequence "approach", else the first.
 std::optional<Job> flight_job(const PlanOptions& options, const std::vector<std::string>& sequences);
 
 /// Maps the whole sequence and gives JSON with a picture of image, flow, depth and map at each moment, as

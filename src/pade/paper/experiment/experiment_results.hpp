@@ -34,7 +34,7 @@ struct Results {
   std::vector<std::string> sequences;
   std::vector<DoneJob> jobs;       ///< in the order of the plan
   std::vector<DoneTiming> timing;  ///< likewise
-  std::string flight;              ///< JSON of figure 4, empty where it was not asked for
+  std::string flight;              ///< JSON of figure 4, empty if it was not asked for
 
   /// Of each sequence the cell `name` of the jobs that match. `flow` empty = any.
   [[nodiscard]] std::vector<SequenceCell> cells(std::string_view table, std::string_view flow,
@@ -43,7 +43,7 @@ struct Results {
   [[nodiscard]] bool has(std::string_view table) const;
 };
 
-/// Reads all finished jobs. Refused where some are not finished: the message says how many, and which is
+/// Reads all finished jobs. Refused if some are not finished: the message says how many, and which is
 /// first.
 Result<Results> read_results(const Experiment& experiment, const Store& store);
 

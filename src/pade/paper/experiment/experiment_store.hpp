@@ -22,7 +22,7 @@ class Store {
   /// Takes the folder `out` or makes it. Refused: a folder that is neither empty nor an experiment's, a
   /// finished experiment unless `again`, and a place that cannot be written to.
   static Result<Store> open(const std::filesystem::path& out, bool again);
-  /// An experiment that is only read. Refused where there is no plan.json.
+  /// An experiment that is only read. Refused if there is no plan.json.
   static Result<Store> read_only(const std::filesystem::path& folder);
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }

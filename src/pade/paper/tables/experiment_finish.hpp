@@ -14,7 +14,7 @@ namespace pade::experiment {
 ///   figures/                         the plots and pictures as files
 ///   timing.json                      all times, and the verdicts on speed
 /// The same jobs give the same bytes, but for timing.json and those last sections. experiment.json is written
-/// last. Refused where jobs are missing.
+/// last. Refused if jobs are missing.
 Result<std::string> finish(const Experiment& experiment, const Store& store);
 
 }  // namespace pade::experiment

@@ -34,7 +34,7 @@ class Errors {
  public:
   explicit Errors(std::span<const ErrorRow> rows);
 
-  /// Metres; NaN where there is none.
+  /// Metres; NaN if there is none.
   [[nodiscard]] double error(const std::string& sequence, const Condition& condition, Method method,
                              Pixels pixels, std::size_t range) const;
 

@@ -14,11 +14,11 @@ namespace pade::evaluation {
 struct Evidence {
   std::string label;  ///< "0-4 m, common pixels"
   Interval interval;
-  bool favours = false;  ///< where the interval is in favour of the claim
+  bool favours = false;  ///< if the interval is in favour of the claim
   [[nodiscard]] bool known() const { return interval.count >= fewest_sequences; }
 };
 
-/// Reproduces where all evidence is known and in favour, in part where some is, not tested where none is
+/// Reproduces if all evidence is known and in favour, in part if some is, not tested if none is
 /// known.
 Outcome outcome_of(std::span<const Evidence> evidence);
 
@@ -31,7 +31,7 @@ Verdict judge(std::string claim, std::string where, std::string measure, std::sp
 /// The same with the first evidence as the main one.
 Verdict judge(std::string claim, std::string where, std::string measure, std::span<const Evidence> evidence);
 
-/// The mean of the finite ones; NaN where there are none.
+/// The mean of the finite ones; NaN if there are none.
 double mean_of_known(std::span<const double> values);
 
 }  // namespace pade::evaluation

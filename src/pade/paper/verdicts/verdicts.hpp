@@ -67,7 +67,7 @@ struct Verdict {
   std::string where;  ///< in the paper: "abstract, 3.2"
   Outcome outcome = Outcome::not_tested;
   std::string sense;    ///< what was measured, with figures
-  std::string measure;  ///< what the interval is of, with unit; empty where nothing was measured
+  std::string measure;  ///< what the interval is of, with unit; empty if nothing was measured
   Interval interval;    ///< the claim's main figure over sequences, 95 %
 };
 
@@ -75,16 +75,16 @@ struct Verdict {
 /// no verdict.
 inline constexpr int fewest_sequences = 6;
 
-/// Verdicts on the claims about accuracy and noise. A claim reproduces where the 95 % bootstrap interval over
+/// Verdicts on the claims about accuracy and noise. A claim reproduces if the 95 % bootstrap interval over
 /// sequences excludes zero in its favour, or, for a claim of sameness or size, lies within the stated margin:
 /// in all ranges, flows and sets of pixels that it speaks of (pixels where both methods answer, and all). In
-/// part: in some of them. Sequences where a figure is missing are left out of its interval.
+/// part: in some of them. Sequences of which a figure is missing are left out of its interval.
 std::vector<Verdict> judge_accuracy(std::span<const ErrorRow> rows, const VerdictOptions& options = {});
 
 /// Verdicts on the claims about time. They depend on the machine and belong beside the other times.
 std::vector<Verdict> judge_speed(std::span<const TimeRow> rows, const VerdictOptions& options = {});
 
-/// TTC's error less PADE's, metres: positive where PADE is ahead. One for each flow and level of noise, in
+/// TTC's error less PADE's, metres: positive if PADE is ahead. One for each flow and level of noise, in
 /// the order of the rows.
 struct Comparison {
   std::string flow;

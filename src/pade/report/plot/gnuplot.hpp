@@ -1,4 +1,4 @@
-// Runs gnuplot, which draws the plots: a separate program, needed only where there is something to plot.
+// Runs gnuplot, which draws the plots: a separate program, needed only if there is something to plot.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace pade::evaluation {
 
-/// True where gnuplot can be run.
+/// True if gnuplot can be run.
 bool has_gnuplot();
 
 /// What gnuplot writes to its standard output for `script`. It is started without a shell and without the

@@ -11,7 +11,7 @@ namespace pade::evaluation {
 /// @param id  as it may stand in an attribute: a letter, then letters, digits, '-' and '_'.
 std::string inline_svg(std::string_view gnuplot_svg, std::string_view id, std::string_view title);
 
-/// `wanted` with what an id may not hold replaced by '-'; a digest of `content` where it is empty.
+/// `wanted` with what an id may not hold replaced by '-'; a digest of `content` if it is empty.
 std::string id_of(std::string_view wanted, std::string_view content);
 
 }  // namespace pade::evaluation

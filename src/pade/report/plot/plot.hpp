@@ -12,7 +12,7 @@
 
 namespace pade::evaluation {
 
-/// How a series is drawn; where empty, by its place in the plot. Series that belong together share a number.
+/// How a series is drawn; if empty, by its place in the plot. Series that belong together share a number.
 struct SeriesStyle {
   std::optional<int>
       colour;               ///< 0 blue, 1 vermilion, 2 green, 3 purple, 4 sky, 5 orange, 6 black; then again
@@ -23,7 +23,7 @@ struct SeriesStyle {
   bool marks = true;  ///< marks the points
 };
 
-/// A function of x, with a band where `low` and `high` are given.
+/// A function of x, with a band if `low` and `high` are given.
 struct LineSeries {
   std::string name;
   std::vector<double> x, y;                 ///< of one length; NaN leaves a gap
@@ -37,9 +37,9 @@ struct PlotFrame {
   std::string x_label;            ///< with unit: "noise [%]"
   std::string y_label;            ///< with unit
   bool log_y = false;             ///< all y must be positive
-  bool y_from_zero = true;        ///< where linear, the axis starts at 0
+  bool y_from_zero = true;        ///< if linear, the axis starts at 0
   int width = 640, height = 400;  ///< px; the picture scales with the page
-  std::string id = {};  ///< begins all ids of the SVG, unique in the page; made from the content where empty
+  std::string id = {};  ///< begins all ids of the SVG, unique in the page; made from the content if empty
 };
 
 struct LinePlot {
@@ -49,7 +49,7 @@ struct LinePlot {
   std::vector<std::pair<double, std::string>> x_ticks;  ///< in place of round numbers; empty = round numbers
 };
 
-/// One bar per group, with whiskers where `low` and `high` are given.
+/// One bar per group, with whiskers if `low` and `high` are given.
 struct BarSeries {
   std::string name;
   std::vector<double> values;               ///< per group; NaN = no bar

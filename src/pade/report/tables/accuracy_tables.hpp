@@ -15,9 +15,9 @@ std::string range_name(const RangeAccuracy& range);
 
 /// A table for a terminal, one row per range and one for all of them, with a line that says what was counted.
 std::string to_table(const DepthAccuracy& accuracy);
-/// One header line, then a row per range and one for all; shares from 0 to 1, empty where there is nothing.
+/// One header line, then a row per range and one for all; shares from 0 to 1, empty if there is nothing.
 std::string to_csv(const DepthAccuracy& accuracy);
-/// evaluation.json. Null where there is nothing.
+/// evaluation.json. Null if there is nothing.
 std::string to_json(const DepthAccuracy& accuracy);
 /// Reads evaluation.json; `file` is what messages call the text.
 Result<DepthAccuracy> accuracy_from_json(std::string_view text, std::string_view file);

@@ -42,7 +42,7 @@ struct MapAccuracy {
 
 /// For a terminal.
 std::string to_table(const MapAccuracy& accuracy);
-/// An object; shares from 0 to 1, null where they are over nothing.
+/// An object; shares from 0 to 1, null if they are over nothing.
 std::string to_json(const MapAccuracy& accuracy);
 
 }  // namespace pade::evaluation

@@ -51,7 +51,7 @@ struct ExactFlow {
   bool visible = false;  ///< inside the other image and not hidden by another surface
 };
 
-/// Empty where the pixel is outside the lens or the point has no image in the other camera (behind it).
+/// Empty if the pixel is outside the lens or the point has no image in the other camera (behind it).
 std::optional<ExactFlow> exact_flow_at(const AnalyticScene& scene, const Camera& camera,
                                        const Pose& T_world_from, const Pose& T_world_to,
                                        const Eigen::Vector2d& pixel);

@@ -51,7 +51,7 @@ struct Flight {
   double first_frame =
       2;           ///< s after the start of the path: the estimators need flight before the first picture
   int frames = 0;  ///< 0 = as many as fit
-  double exposure_time = 0;      ///< s; motion blur where it is not 0; poses are of mid exposure
+  double exposure_time = 0;      ///< s; motion blur if it is not 0; poses are of mid exposure
   int blur_samples = 8;          ///< pictures that are averaged over the exposure
   std::optional<Camera> camera;  ///< without it the first camera of the world, else 640 x 480 with f = 554.26
   std::optional<Pose> T_body_camera;  ///< without it as in the world, else looking along body x

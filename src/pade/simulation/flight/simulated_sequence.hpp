@@ -22,7 +22,7 @@ struct SequenceOptions {
   bool save_flow =
       false;  ///< flow_next/, flow_previous/ (.flo) and visible_next/, visible_previous/ (PNG, 255 = seen)
   io::Overwrite overwrite = io::Overwrite::refuse;
-  bool keep_finished = false;  ///< where `target` holds this very sequence already, that is success
+  bool keep_finished = false;  ///< if `target` holds this very sequence already, that is success
 };
 
 /// Called after each frame with the numbers of finished frames and of all frames.

@@ -93,7 +93,7 @@ class Scene {
   [[nodiscard]] SurfacePoint surface(Primitive primitive, const Eigen::Vector3d& position,
                                      const Eigen::Vector3d& view_direction, bool with_occlusion) const;
 
-  /// True where the point lies inside a closed shape (a box, an ellipsoid, a cylinder or a capsule), with the
+  /// True if the point lies inside a closed shape (a box, an ellipsoid, a cylinder or a capsule), with the
   /// visual's name.
   [[nodiscard]] std::optional<std::string> inside_of(const Eigen::Vector3d& point) const;
 

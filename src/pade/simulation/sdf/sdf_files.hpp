@@ -16,11 +16,11 @@ namespace pade::simulation {
 /// file that names them.
 using ResourcePaths = std::vector<std::filesystem::path>;
 
-/// The file or folder that a URI (file://, model://, or a plain path) means; empty where there is none.
+/// The file or folder that a URI (file://, model://, or a plain path) means; empty if there is none.
 std::optional<std::filesystem::path> resolve_uri(const std::string& uri, const std::filesystem::path& base,
                                                  const ResourcePaths& resources);
 
-/// The SDF file of a model folder (by model.config, else model.sdf), or the path itself where it is a file.
+/// The SDF file of a model folder (by model.config, else model.sdf), or the path itself if it is a file.
 std::optional<std::filesystem::path> model_file(const std::filesystem::path& path);
 
 /// Checks a file and all that it includes: it can be read, its version is 1.0 to 1.9, included files exist,

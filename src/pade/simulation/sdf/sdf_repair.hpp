@@ -31,7 +31,7 @@ struct WorldState {
   std::vector<std::string> warnings;        ///< what was not applied
 };
 
-/// Reads the first <state> of a world; empty where there is none.
+/// Reads the first <state> of a world; empty if there is none.
 WorldState read_state(const sdf::ElementPtr& world, const std::string& file);
 
 /// Puts model://sun and model://ground_plane, which every installation of Gazebo has, into a folder of their
@@ -42,7 +42,7 @@ class BuiltinModels {
   ~BuiltinModels();
   BuiltinModels(const BuiltinModels&) = delete;
   BuiltinModels& operator=(const BuiltinModels&) = delete;
-  [[nodiscard]] const std::string& folder() const { return folder_; }  ///< empty where it could not be made
+  [[nodiscard]] const std::string& folder() const { return folder_; }  ///< empty if it could not be made
 
  private:
   std::string folder_;

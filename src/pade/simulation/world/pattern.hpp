@@ -1,4 +1,4 @@
-// Names of the procedural surface patterns; drawn in texture.cpp.
+// The procedural surface patterns and their names; pattern.cpp draws them.
 #pragma once
 
 #include <array>

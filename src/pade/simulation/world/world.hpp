@@ -59,7 +59,7 @@ struct Material {
   /// coordinates.
   std::shared_ptr<const cv::Mat> image;
   std::string image_file;  ///< for messages
-  Pattern pattern;         ///< used where there is no image
+  Pattern pattern;         ///< used if there is no image
 };
 
 struct Visual {

@@ -7,8 +7,8 @@
 
 namespace pade::simulation {
 
-/// 16 hexadecimal digits (FNV-1a over shapes, poses, materials, images and light). Tells worlds apart, not
-/// friend from foe.
+/// 16 hexadecimal digits (FNV-1a over shapes, poses, materials, images and light). Not
+/// cryptographic: it tells worlds apart.
 std::string world_fingerprint(const World& world);
 
 }  // namespace pade::simulation

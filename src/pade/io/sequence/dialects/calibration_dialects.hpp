@@ -40,12 +40,12 @@ Result<Calibration> read_orb_slam(const Yaml& root, const std::string& file, int
 bool is_vins(const Yaml& root);
 Result<Calibration> read_vins(const Yaml& root, const std::string& file);
 
-/// Files that are no YAML. Empty where `text` is none of them: KITTI's calib_cam_to_cam.txt (P_rect_00: the
+/// Files that are no YAML. Empty if `text` is none of them: KITTI's calib_cam_to_cam.txt (P_rect_00: the
 /// images of the raw data are rectified) and calib.txt (P0), COLMAP's cameras.txt.
 std::optional<Result<Calibration>> read_text_dialect(std::string_view text, const std::string& file,
                                                      int camera);
 
-/// What the dialects share: the lens from names and numbers, each refused by name where it is impossible.
+/// What the dialects share: the lens from names and numbers, each refused by name if it is impossible.
 void read_matrix(CalibrationFields& fields, Camera& camera, const std::string& name);
 void read_distortion(CalibrationFields& fields, Camera& camera, const std::string& model,
                      const std::string& name);

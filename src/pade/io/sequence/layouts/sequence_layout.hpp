@@ -33,7 +33,7 @@ struct SequenceListing {
   std::size_t motions_without_scale = 0;  ///< of computed poses
   std::size_t frames_without_pose = 0;    ///< known when frames and poses have met
   Calibration calibration;
-  std::optional<WorldUp> world_up;  ///< where the layout itself prescribes it
+  std::optional<WorldUp> world_up;  ///< if the layout itself prescribes it
 };
 
 /// What a layout needs to know of the options.
@@ -55,7 +55,7 @@ Result<SequenceListing> read_kitti_layout(const std::filesystem::path& folder, c
 Result<SequenceListing> read_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
                                     ReadReport& report);
 
-/// Image files directly inside `folder`, sorted by name; empty where there is no such folder.
+/// Image files directly inside `folder`, sorted by name; empty if there is no such folder.
 std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder);
 
 /// `base`, the layout's own calibration, with what camera.yaml in `folder` and then the calibration file of
