@@ -17,6 +17,7 @@
 #include "pade/core/depth_image.hpp"
 #include "pade/core/flow_field.hpp"
 #include "pade/core/frame.hpp"
+#include "pade/core/health.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/result.hpp"
 #include "pade/depth/depth_estimator.hpp"
@@ -127,13 +128,6 @@ struct MapperUpdate {
   depth::DepthDiagnostics diagnostics;
   mapping::MapChange change;                         ///< what the depth image changed in the map
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
-};
-
-/// Counts of a flight so far.
-struct MapperHealth {
-  std::size_t frames = 0;  ///< calls of add()
-  std::size_t mapped = 0;
-  std::size_t skipped = 0;
 };
 
 /// Obstacle mapping from one camera and its poses. Not thread-safe; nothing global, no files.

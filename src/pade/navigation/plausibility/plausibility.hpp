@@ -38,13 +38,7 @@ std::vector<Hint> check_log(const NavigationLog& log);
 /// The hint says what was done; empty where nothing was.
 std::optional<Hint> regularise_stamps(std::vector<ImuSample>& samples);
 
-/// What the filter made of one sensor.
-struct SensorSummary {
-  std::string sensor;            ///< "gnss_velocity", "gnss_position", "barometer", "magnetometer", "heading"
-  std::size_t measurements = 0;  ///< that reached the filter
-  std::size_t refused = 0;       ///< of them, outside the gate, or taken back only in a re-acquisition
-  double chi_square = 0;         ///< mean per degree of freedom, before the gate; 1 is consistent
-};
+/// What the filter made of each sensor (core/health.hpp).
 std::vector<SensorSummary> summarise(std::span<const Measurement> measurements);
 
 /// What the innovations of a run say:
