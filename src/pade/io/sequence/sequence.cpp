@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "pade/core/option_check.hpp"
+#include "pade/io/sequence/depth_file.hpp"
 #include "pade/io/sequence/frame_mask.hpp"
 #include "pade/io/sequence/image_file.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
@@ -437,13 +438,11 @@ Result<cv::Mat> Sequence::truth(std::size_t i) const {
     return Error{
         fmt::format("{}: no depth image within {:g} s", entry.image.string(), options().largest_truth_gap)};
   }
-  const auto raw = read_image(entry.depth);
+  const auto raw = read_depth_file(entry.depth);
   if (!raw) return raw.error();
-  if (raw->size() != data_->raw_camera.size() || raw->channels() != 1 || raw->depth() == CV_8U) {
-    return Error{fmt::format(
-        "{}: the depth image has {} pixels, {} channels of {} bits, expected {}, one channel of 16",
-        entry.depth.string(), size_text(raw->size()), raw->channels(), 8 * raw->elemSize1(),
-        size_text(data_->raw_camera.size()))};
+  if (raw->size() != data_->raw_camera.size()) {
+    return Error{fmt::format("{}: the depth image has {} pixels, expected {}", entry.depth.string(),
+                             size_text(raw->size()), size_text(data_->raw_camera.size()))};
   }
   cv::Mat depth;
   raw->convertTo(depth, CV_32F);
