@@ -24,6 +24,7 @@ namespace pade::navigation {
 ///   gyro-axes          gyroscopes in other axes than accelerometers
 ///   gnss-axes          velocities of the GNSS in north, east, down called east, north, up
 ///   gnss-lag           velocities of the GNSS late or early, by tenths of a second or by leap seconds
+///   gnss-apart         positions and velocities of the GNSS apart in time, and which of them is late
 ///   gnss-degrees       latitude and longitude where metres are expected
 ///   gnss-contradiction positions and velocities of the GNSS do not belong together
 ///   imu-contradiction  IMU and GNSS do not belong together, and no reading above explains it
