@@ -54,8 +54,12 @@ std::vector<StampedFile> files_named_by_time(const fs::path& folder, ReadReport&
     if (const auto time = parse_stamp(stems[i], unit)) {
       files.push_back({*time, images[i]});
     } else {
-      report.skip(images[i].string(),
-                  fmt::format("found name {}, expected the time in seconds", in_quotes(stems[i])));
+      report.skip(
+          images[i].string(),
+          fmt::format(
+              "found name {}, expected the time in seconds, or beside the folder a list {}.txt of rows 'time "
+              "file'",
+              in_quotes(stems[i]), folder.filename().string()));
     }
   }
   std::stable_sort(files.begin(), files.end(),
