@@ -148,7 +148,7 @@ const Case kAll[] = {
      simulated("state_moved.world") + " && $PADE info OUT",
      0,
      {"on 3 % of the pixels, 6.9"},
-     {"warning"}},
+     {"pade simulate: warning"}},
     {"PartOfAMesh", "W5_submesh", simulated("left.world"), 0, {}, {"warning"}},
     {"ImageWhereGazeboLooks",
      "W6_dae_texture_folder",

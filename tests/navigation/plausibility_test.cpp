@@ -29,11 +29,14 @@ NavigationLog good(double speed = 1, std::uint64_t seed = 1) {
 
 auto has(const char* id) { return Contains(Field(&Hint::id, id)); }
 
-/// The lag that a hint names, from its advice "... (--gnss-latency 0.25) ...".
+/// The lag that a hint names: "the GNSS velocities are 0.25 s late ...".
 double lag_of(const std::vector<Hint>& hints) {
+  constexpr std::string_view kBefore = "velocities are ";
   for (const Hint& hint : hints) {
-    const std::size_t at = hint.advice.find("--gnss-latency ");
-    if (hint.id == "gnss-lag" && at != std::string::npos) return std::stod(hint.advice.substr(at + 15));
+    const std::size_t at = hint.message.find(kBefore);
+    if (hint.id != "gnss-lag" || at == std::string::npos) continue;
+    const double lag = std::stod(hint.message.substr(at + kBefore.size()));
+    return hint.message.find(" s early") == std::string::npos ? lag : -lag;
   }
   return 0;
 }
@@ -108,12 +111,20 @@ TEST(LogCheck, TellsWhatIsLate) {
   for (GnssVelocity& v : log.gnss.velocities) v.time.nanoseconds += 500'000'000;
   for (GnssFix& fix : log.gnss.fixes) fix.time.nanoseconds += 800'000'000;
   const auto hints = check_log(log);
-  EXPECT_NEAR(lag_of(hints), 0.5, 0.06);
   const auto late =
       std::find_if(hints.begin(), hints.end(), [](const Hint& h) { return h.id == "gnss-apart"; });
   ASSERT_NE(late, hints.end());
-  EXPECT_NEAR(std::stod(late->advice.substr(late->advice.find("--gnss-latency ") + 15)), 0.8, 0.12)
-      << late->advice;
+  const auto after = [&](const std::string& option) {
+    return std::stod(late->advice.substr(late->advice.find(option) + option.size()));
+  };
+  EXPECT_NEAR(after("--gnss-latency "), 0.8, 0.12) << late->advice;
+  EXPECT_NEAR(after("--gnss-velocity-latency "), 0.5, 0.06) << late->advice;
+  EXPECT_NEAR(lag_of(hints), 0.5, 0.06);
+  for (const Hint& hint : hints) {
+    if (hint.id != "gnss-lag") continue;
+    EXPECT_THAT(hint.advice, Not(testing::HasSubstr("--gnss-latency")))
+        << "which would move the positions by the same";
+  }
 }
 
 TEST(LogCheck, TellsVelocitiesThatAreLateFromPositionsThatAreEarly) {

@@ -274,7 +274,7 @@ void judge(PoseCheck& check) {
 std::string_view name_of(PoseConvention convention) {
   constexpr std::array<std::string_view, pose_conventions.size()> names = {
       "as given",     "inverted",      "inverse relative", "GL axes",     "FRD axes",   "FLU axes",
-      "scalar first", "images turned", "millimetres",      "left-handed", "row before", "row after"};
+      "scalar first", "images turned", "millimetres",      "left handed", "row before", "row after"};
   return names[static_cast<std::size_t>(convention)];
 }
 

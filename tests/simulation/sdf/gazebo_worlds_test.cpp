@@ -338,7 +338,7 @@ std::vector<Case> cases() {
        {{"models/b/model.sdf", model_file("b", kBrownBox)}}},
       {"NothingThatIsNotSeenRefuses",
        "<physics type='ode'><max_step_size>-1</max_step_size></physics><gui><camera name='g'/></gui>"
-       "<model name='m'><link name='l'><gravity>maybe</gravity>" +
+       "<model name='m'><link name='l'><self_collide>true</self_collide>" +
            box() +
            "</link><joint name='j' type='revolute'><parent>l</parent><child>ghost</child></joint></model>",
        {{0, 1, 7.5}},

@@ -190,42 +190,63 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
       "see which of the two is wrong: axes, unit (m/s), or the clock of one of them");
 }
 
-/// Positions and velocities that are apart in time. `velocity_lag` is what the IMU says of the velocities, s;
-/// where it says nothing, it may still tell which of the two is late.
+/// Which of positions and velocities a lag between them is laid upon.
+enum class Late { positions, velocities, either };
+
+std::string described(const PositionLag& apart, Late which) {
+  const double by = std::abs(apart.seconds);
+  const auto late = [](double seconds) { return seconds > 0 ? "late" : "early"; };
+  switch (which) {
+    case Late::positions:
+      return fmt::format("the GNSS positions are {:.2f} s {} against its velocities", by,
+                         late(apart.seconds));
+    case Late::velocities:
+      return fmt::format("the GNSS velocities are {:.2f} s {} against its positions", by,
+                         late(-apart.seconds));
+    case Late::either:
+      break;
+  }
+  return fmt::format(
+      "positions and velocities of the GNSS are {:.2f} s apart: the positions are {}, or the velocities {}",
+      by, late(apart.seconds), late(-apart.seconds));
+}
+
+/// By what the IMU says: `velocity_lag` in s where it has found one, else where it clearly fits better.
+Late late_one(const PositionLag& apart, const ForceMatch& imu, double velocity_lag) {
+  constexpr double kPunctual = 0.05;  // s
+  constexpr double kClearly = 0.8;    // of the misfit
+  if (velocity_lag != 0) {
+    return std::abs(velocity_lag + apart.seconds) < kPunctual ? Late::velocities : Late::positions;
+  }
+  const double as_stamped = imu.misfit();
+  const double moved = imu.misfit(-apart.seconds);
+  if (as_stamped < kClearly * moved) return Late::positions;
+  return moved < kClearly * as_stamped ? Late::velocities : Late::either;
+}
+
+/// Positions and velocities that are apart in time.
 void check_apart(const GnssLog& gnss, const ForceMatch& imu, double velocity_lag, std::vector<Hint>& hints) {
   const auto apart = position_lag(gnss);
   if (!apart) return;
-  constexpr double kClearly = 0.8;  // of the misfit
-  const double as_stamped = imu.misfit();
-  const double moved = imu.misfit(-apart->seconds);
-  const bool positions = velocity_lag != 0 || as_stamped < kClearly * moved;
-  const bool velocities = !positions && moved < kClearly * as_stamped;
-  const auto late = [](double seconds) { return seconds > 0 ? "late" : "early"; };
+  const Late late = late_one(*apart, imu, velocity_lag);
   const auto options = [](double position, double velocity) {
     return fmt::format("--gnss-latency {:.2f} --gnss-velocity-latency {:.2f}", position, velocity);
   };
   const std::string of_positions = options(velocity_lag + apart->seconds, velocity_lag);
-  const std::string of_velocities = options(0, -apart->seconds);
-  const std::string what =
-      positions ? fmt::format("the GNSS positions are {:.2f} s {} against its velocities",
-                              std::abs(apart->seconds), late(apart->seconds))
-      : velocities
-          ? fmt::format("the GNSS velocities are {:.2f} s {} against its positions", std::abs(apart->seconds),
-                        late(-apart->seconds))
-          : fmt::format(
-                "positions and velocities of the GNSS are {:.2f} s apart: the positions are {}, or the "
-                "velocities {}",
-                std::abs(apart->seconds), late(apart->seconds), late(-apart->seconds));
+  const std::string of_velocities = options(0, velocity_lag != 0 ? velocity_lag : -apart->seconds);
+  for (Hint& hint : hints) {
+    if (hint.id == "gnss-lag") hint.advice = "this is not the lag of the positions: see what is said of both";
+  }
   add(hints, "gnss-apart", HintSeverity::warning,
       fmt::format("{} (± {:.2f} s): the ways between fixes and what the velocities fly differ by {:.2f} m as "
                   "stamped, and "
                   "by {:.2f} m when moved by that",
-                  what, std::max(apart->sigma, 0.01), apart->as_stamped, apart->moved),
-      positions || velocities
-          ? fmt::format("give both latencies ({}), or correct the stamps",
-                        positions ? of_positions : of_velocities)
-          : fmt::format("try {}, then {}, and keep what leaves the smaller mean χ² of the positions",
-                        of_positions, of_velocities));
+                  described(*apart, late), std::max(apart->sigma, 0.01), apart->as_stamped, apart->moved),
+      late == Late::either
+          ? fmt::format("try {}, then {}, and keep what leaves the smaller mean χ² of the positions",
+                        of_positions, of_velocities)
+          : fmt::format("give both latencies ({}), or correct the stamps",
+                        late == Late::positions ? of_positions : of_velocities));
 }
 
 /// What of the readings of IMU and GNSS fits best. Returns the seconds that the velocities are late, 0 where

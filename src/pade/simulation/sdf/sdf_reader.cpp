@@ -273,9 +273,7 @@ Status Reader::add_link(const sdf::Link& link, const Pose& T_world_link, const s
 
 Status Reader::add_polylines(const sdf::ElementPtr& geometry, const Visual& visual) {
   const sdf::ElementPtr first = geometry->GetElement("polyline");
-  const auto height_of = [](const sdf::ElementPtr& line) {
-    return line->HasElement("height") ? line->Get<double>("height") : 1.0;
-  };
+  const double height = first->Get("height", 1.0).first;
   std::vector<Polygon> polygons;
   for (sdf::ElementPtr line = first; line; line = line->GetNextElement("polyline")) {
     polygons.emplace_back();
@@ -284,13 +282,13 @@ Status Reader::add_polylines(const sdf::ElementPtr& geometry, const Visual& visu
       const auto p = point->Get<ignition::math::Vector2d>();
       polygons.back().emplace_back(p.X(), p.Y());
     }
-    if (height_of(line) != height_of(first)) {
+    if (line->Get("height", 1.0).first != height) {
       world_.warnings.push_back(
           fmt::format("{}: visual '{}': the polylines of one geometry have one height, {:g} m of the first",
-                      place_of(line, file_.string()), visual.name, height_of(first)));
+                      place_of(line, file_.string()), visual.name, height));
     }
   }
-  auto mesh = extrude(std::move(polygons), height_of(first));
+  auto mesh = extrude(std::move(polygons), height);
   if (!mesh) {
     return Error{fmt::format("{}: visual '{}': <polyline>: {}", place_of(first, file_.string()), visual.name,
                              mesh.error().message)};

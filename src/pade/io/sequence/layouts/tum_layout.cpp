@@ -171,8 +171,15 @@ Result<SequenceListing> read_tum_layout(const fs::path& folder, const LayoutChoi
   if (!calibration) return calibration.error();
   listing.calibration = std::move(*calibration);
 
-  auto images = list_images(folder, name_of_images(folder), false, report);
+  const std::string name = name_of_images(folder);
+  auto images = list_images(folder, name, false, report);
   if (!images) return images.error();
+  if (images->empty() && report.skipped.empty()) {
+    return Error{fmt::format(
+        "{}: no images found, expected PNG, JPEG, PGM, PPM, PNM, BMP, TIFF or WebP named by their time in "
+        "seconds, or listed in {}.txt",
+        (folder / name).string(), name)};
+  }
   listing.images = std::move(*images);
   const bool listed = path_exists(folder / "associations.txt");
   if (path_exists(folder / "depth") || path_exists(folder / "depth.txt") || listed) {
