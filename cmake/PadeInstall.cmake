@@ -30,6 +30,7 @@ set(pade_public_headers
   depth/edges.hpp
   depth/focus_of_expansion.hpp
   depth/motion_refinement.hpp
+  depth/multi_view/common_error.hpp
   depth/multi_view/views_depth.hpp
   mapping/occupancy_map.hpp
   io/atomic_output.hpp

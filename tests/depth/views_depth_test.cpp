@@ -27,10 +27,11 @@ struct Pixel {
     image.own_variance = one(measured ? 1 : kNan);
     image.bound = one(state == DepthState::measured ? 5 : kNan);
     image.state = cv::Mat(9, 9, CV_8UC1, cv::Scalar(code(state)));
-    field = {one(d), one(information), one(0), one(spread), one(matching), one(0)};
+    field = {one(d), one(information), one(spread), one(0), one(matching), one(100)};
   }
-  void read(const DepthOptions& depth = {}, const ViewsDepthOptions& options = {}) {
-    read_views(field, kScale, depth, options, image);
+  void read(const DepthOptions& depth = {}, const ViewsDepthOptions& options = {},
+            const CommonError& common = {}) {
+    read_views(field, kScale, common, depth, options, image);
   }
   [[nodiscard]] float z() const { return image.depth.at<float>(4, 4); }
   [[nodiscard]] float own() const { return image.own_variance.at<float>(4, 4); }
@@ -45,9 +46,43 @@ TEST(ViewsDepth, TakesThePlaceOfThePairWithItsOwnVariance) {
   EXPECT_FLOAT_EQ(p.z(), 8);
   // sigma of d is 0.1 px: sigma_Z = Z^2 / scale * 0.1
   EXPECT_NEAR(std::sqrt(p.own()), 64 / kScale * 0.1, 1e-5);
-  // what is common to the image is that of 1/Z
-  EXPECT_NEAR(p.variance() - p.own(), 0.5 * std::pow(8.0 / 9, 4), 1e-5);
+  // exact motions have no error for the pixels to share
+  EXPECT_FLOAT_EQ(p.variance(), p.own());
   EXPECT_EQ(p.state(), code(DepthState::measured));
+}
+
+TEST(ViewsDepth, WhatTheMotionsErrIsCommonToThePixelsAndShortensTheirBounds) {
+  Camera camera{};
+  camera.fx = camera.fy = 100;
+  camera.cx = camera.cy = 4;
+  camera.width = camera.height = 9;
+  RelativeMotion motion;
+  motion.t_reference_other = {-1, 0, 0};
+  motion.covariance(0, 0) = 0.02 * 0.02;  // 2 % of the baseline
+  const CommonError common(camera, {motion}, 48);
+  Pixel p(DepthState::measured, 125, 100);
+  p.read({}, {.sigma_scale = 1, .relative_sigma = 0}, common);
+  EXPECT_NEAR(std::sqrt(p.variance() - p.own()), 0.02 * 8, 1e-4);
+  DepthOptions options;
+  Pixel far(DepthState::low_parallax, 20, 1);
+  far.read(options, {.sigma_scale = 1, .relative_sigma = 0}, common);
+  EXPECT_NEAR(far.bound(), kScale / (20 + options.bound_sigmas * std::hypot(1, 0.02 * 20)), 1e-3);
+}
+
+/// What the texture around shows lies at another depth: the pixel's own is as uncertain as the two differ.
+TEST(ViewsDepth, DepthFromTextureAtAnotherDepthIsUncertain) {
+  Pixel p(DepthState::measured, 125, 100);
+  p.field.offset.setTo(10);
+  p.read({}, {.sigma_scale = 1, .relative_sigma = 0});
+  EXPECT_NEAR(std::sqrt(p.own()) / p.z(), 10.0 / 125, 0.01);
+}
+
+TEST(ViewsDepth, TextureAsFaintAsTheNoiseSaysNothing) {
+  Pixel p(DepthState::measured, 125, 100);
+  p.field.texture.setTo(1);
+  p.read();
+  EXPECT_EQ(p.state(), code(DepthState::no_texture));
+  EXPECT_TRUE(std::isnan(p.z()));
 }
 
 TEST(ViewsDepth, ViewsThatContradictEachOtherAreLessCertain) {

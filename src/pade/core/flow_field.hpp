@@ -20,10 +20,12 @@ struct FlowField {
 struct ParallaxField {
   cv::Mat distance;     ///< d, dense
   cv::Mat information;  ///< sum over the matching views of 1 / sigma^2 of d; 0 = no view says anything
-  cv::Mat step;         ///< mean of the further steps in d that the views still ask for
-  cv::Mat spread;       ///< chi-square, of matching - 1, of these steps about their mean
-  cv::Mat matching;     ///< number of views whose match is right, as far as the images tell
-  cv::Mat wrong;        ///< number of views in which it is not
+  cv::Mat spread;  ///< chi-square, of matching - 1, of the further steps that these views ask for about their
+                   ///< mean
+  cv::Mat offset;  ///< d of the texture that this was read from, around a pixel, beyond the pixel's own
+  cv::Mat matching;  ///< number of views whose match is right, as far as the images tell
+  cv::Mat texture;   ///< squared slopes of the image along the parallax, in those of the noise around; noise
+                     ///< alone: .9
 
   [[nodiscard]] bool empty() const { return distance.empty(); }
 };

@@ -54,7 +54,7 @@ struct DepthOptions {
   double residual_gate = 5;
   double residual_angle = 0.25;
   double texture_gate = 3;
-  double texture_correlation = 0.5;
+  double texture_correlation = 0.4;
   double bound_sigmas = 3.8;
 
   template <class Self, class Visitor>

@@ -267,25 +267,12 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   // Average optical flow and calculate the depth image (Section 2.3).
   estimate_depth(pair, reference, prior.R_reference_other, update_.depth);
   update_.step = options_.step;
-  if (two) {
-    const int step = longer_step(newest.frame, pair);
-    const Frame& other = before(step).frame;
-    RelativeMotion motion = relative_motion(newest.frame.T_world_camera, other.T_world_camera,
-                                            seconds_between(newest.frame.time, other.time));
-    motion.covariance = over_several(pair.motion, (step + options_.step - 1) / options_.step);
-    cv::Mat start;
-    {
-      const Stopwatch watch(update_, Stage::flow);
-      start = depth::predict_flow(pair.flow.vectors, camera_, pair.motion, motion);
-    }
-    std::swap(first_depth_, update_.depth);
-    pair = match(reference, other, motion, *flow_, start);
-    estimate_depth(pair, reference, {}, update_.depth);
-    const Stopwatch watch(update_, Stage::depth);
-    depth::fuse_pairs(first_depth_, update_.depth);
-    update_.step = step;
+  update_.views = 0;
+  if (many_views()) {
+    see_from_many(newest.frame, pair);
+  } else if (two) {
+    look_farther_back(newest.frame, pair);
   }
-  if (many_views()) see_from_many(newest.frame, pair);
   if (options_.depth.gates == depth::Gates::on) {
     const Stopwatch watch(update_, Stage::depth);
     depth::guard_edges(update_.depth, options_.edges);
@@ -375,19 +362,44 @@ int ObstacleMapper::longer_step(const Frame& newest, const Pair& first) const {
   return options_.step;
 }
 
-/// Views whose baselines double, from the longest one on.
-std::vector<const Frame*> ObstacleMapper::choose_views(const Frame& newest) const {
-  std::vector<const Frame*> views;
-  const auto baseline = [&](const Frame& frame) {
-    return (frame.T_world_camera.translation - newest.T_world_camera.translation).norm();
-  };
+/// A second pair, over a longer baseline, that starts where the first has ended.
+void ObstacleMapper::look_farther_back(const Frame& newest, Pair& pair) {
+  const int step = longer_step(newest, pair);
+  const Frame& other = before(step).frame;
+  const RelativeMotion motion = motion_to(newest, pair, step);
+  cv::Mat start;
+  {
+    const Stopwatch watch(update_, Stage::flow);
+    start = depth::predict_flow(pair.flow.vectors, camera_, pair.motion, motion);
+  }
+  std::swap(first_depth_, update_.depth);
+  pair = match(newest, other, motion, *flow_, start);
+  estimate_depth(pair, newest, {}, update_.depth);
+  const Stopwatch watch(update_, Stage::depth);
+  depth::fuse_pairs(first_depth_, update_.depth);
+  update_.step = step;
+}
+
+/// Of the frame `frames` before the newest one, seen from it, by the refined poses.
+/// @param pair  the newest one and its partner
+RelativeMotion ObstacleMapper::motion_to(const Frame& newest, const Pair& pair, int frames) const {
+  const Frame& other = before(frames).frame;
+  RelativeMotion motion =
+      relative_motion(newest.T_world_camera, other.T_world_camera, seconds_between(newest.time, other.time));
+  motion.covariance = over_several(pair.motion, (frames + options_.step - 1) / options_.step);
+  return motion;
+}
+
+/// Frames back to views whose baselines double, the longest one last.
+std::vector<int> ObstacleMapper::choose_views(const Frame& newest) const {
+  std::vector<int> views;
   const int available = std::min(options_.views.frames, static_cast<int>(recent_.size()));
   double wanted = std::numeric_limits<double>::infinity();
   for (int i = available; i >= 1 && std::ssize(views) < options_.views.count; --i) {
-    const Frame& frame = before(i).frame;
-    const double length = baseline(frame);
+    const double length =
+        (before(i).frame.T_world_camera.translation - newest.T_world_camera.translation).norm();
     if (length > wanted || !(length > 0)) continue;
-    views.push_back(&frame);
+    views.push_back(i);
     wanted = length / 2 * (1 + 1e-6);
   }
   std::reverse(views.begin(), views.end());
@@ -397,31 +409,36 @@ std::vector<const Frame*> ObstacleMapper::choose_views(const Frame& newest) cons
 /// Several views at once, from where the pair has ended.
 void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   const Stopwatch watch(update_, Stage::depth);
-  const std::vector<const Frame*> frames = choose_views(newest);
-  if (frames.empty()) {
+  const std::vector<int> chosen = choose_views(newest);
+  if (chosen.empty()) {
     found_ = {};
     return;
   }
-  const double baseline =
-      (frames.back()->T_world_camera.translation - newest.T_world_camera.translation).norm();
+  std::vector<flow::View> views;
+  std::vector<RelativeMotion> motions;
+  for (const int frames : chosen) {
+    motions.push_back(motion_to(newest, pair, frames));
+    views.push_back({before(frames).frame.image, {}, {}});
+  }
+  const double baseline = motions.back().t_reference_other.norm();
   const double scale = camera_.fx * baseline;
   const cv::Matx33d K(camera_.fx, 0, camera_.cx, 0, camera_.fy, camera_.cy, 0, 0, 1);
-  std::vector<flow::View> views;
-  for (const Frame* frame : frames) {
-    const Pose T_view_newest = frame->T_world_camera.inverse() * newest.T_world_camera;
-    const Eigen::Matrix3d R = T_view_newest.matrix3();
-    const Eigen::Vector3d& t = T_view_newest.translation;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Eigen::Matrix3d R = motions[i].R_reference_other.transpose();
+    const Eigen::Vector3d t = -(R * motions[i].t_reference_other);
     const cv::Matx33d rotation(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1),
                                R(2, 2));
-    views.push_back({frame->image, cv::Matx33f(K * rotation * K.inv()),
-                     cv::Vec3f(K * cv::Vec3d(t.x(), t.y(), t.z()) * (1 / scale))});
+    views[i].H = cv::Matx33f(K * rotation * K.inv());
+    views[i].e = cv::Vec3f(K * cv::Vec3d(t.x(), t.y(), t.z()) * (1 / scale));
   }
-  cv::Mat start = depth::start_of_views(update_.depth, pair.flow.vectors, camera_, pair.motion,
-                                        newest.T_world_camera, found_, baseline, options_.views.depth);
-  const ParallaxField field =
+  const cv::Mat start = depth::start_of_views(update_.depth, pair.flow.vectors, camera_, pair.motion,
+                                              newest.T_world_camera, found_, baseline, options_.views.depth);
+  const ParallaxField& field =
       views_.estimate(newest.image, views, start * scale, update_.diagnostics.image_noise);
-  depth::read_views(field, scale, options_.depth, options_.views.depth, update_.depth);
+  const depth::CommonError common(camera_, motions, options_.views.flow.largest_parallax);
+  depth::read_views(field, scale, common, options_.depth, options_.views.depth, update_.depth);
   found_ = {newest.T_world_camera, field.distance * (1 / scale)};
+  update_.views = static_cast<int>(chosen.size());
 }
 
 void ObstacleMapper::estimate_depth(const Pair& pair, const Frame& reference,

@@ -78,7 +78,8 @@ struct ObstacleMapperOptions {
     field("order", self.order, "newest | first: the frame of a pair on whose pixels the depth lives");
     field("step", self.step, "pairs each frame with the step-th before it");
     field("longest_step", self.longest_step,
-          "then with one up to this many frames before it, for precision; up to step = one pair only");
+          "two views: then with one up to this many frames before it, for precision; up to step = one pair "
+          "only, also without further views");
     field("prior_level", self.prior_level,
           "coarsest pyramid level at which the first flow takes up what the last depth image foretells; "
           "-1 = it starts from nothing");
@@ -123,6 +124,7 @@ struct MapperUpdate {
   RelativeMotion motion;  ///< the other camera of the (last) pair seen from the reference, refined
   FlowField flow;  ///< of that pair, from the reference to the other image (derotated where derotate = image)
   int step = 0;    ///< frames between the two
+  int views = 0;   ///< further frames that the depth was read from, together; 0 = from the pair alone
   depth::RefinedMotion refinement;  ///< of the motion over `step` of the options, and how it was found
   DepthImage depth;
   depth::DepthDiagnostics diagnostics;
@@ -185,8 +187,10 @@ class ObstacleMapper {
   void refine(Pair& pair, const Frame& reference);
   void place(Tracked& newest, const Tracked& older) const;
   [[nodiscard]] int longer_step(const Frame& newest, const Pair& first) const;
+  void look_farther_back(const Frame& newest, Pair& pair);
   void see_from_many(const Frame& newest, const Pair& pair);
-  [[nodiscard]] std::vector<const Frame*> choose_views(const Frame& newest) const;
+  [[nodiscard]] RelativeMotion motion_to(const Frame& newest, const Pair& pair, int frames) const;
+  [[nodiscard]] std::vector<int> choose_views(const Frame& newest) const;
   void estimate_depth(const Pair& pair, const Frame& reference, const std::optional<Eigen::Matrix3d>& removed,
                       DepthImage& out);
 

@@ -14,6 +14,7 @@ namespace {
 constexpr float kEpipoleRadius = 5;  // px: nearer to the epipole the parallax of a pair says little
 constexpr float kNearest = 0.05F;    // m
 constexpr int kBoundRadius = 2;      // px
+constexpr float kTexture = 1.6F;     // least squared slopes, in those of noise
 constexpr float kVague = 0.5F;       // px: sigma of the parallax from which on the image says nothing of it
 
 constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
@@ -157,23 +158,27 @@ class Reader {
     row.depth[u] = row.variance[u] = row.own_variance[u] = std::numeric_limits<float>::quiet_NaN();
     row.state[u] = code(why);
   }
+  /// Whether a depth with this variance is one to publish.
+  [[nodiscard]] bool is_measured(float d, float sigma2) const {
+    return d > 0 && sigma2 * gate2_ < d * d && scale_ <= range_ * d;
+  }
   /// Depth, variance and state in place of what pixel u has.
-  void place(const Row& row, int u, float d, float sigma2) const {
+  /// @param common  variance of d that all pixels share
+  void place(const Row& row, int u, float d, float sigma2, float common) const {
     const float z = scale_ / d;
     const float e2 = sigma2 / (d * d);
-    const bool was_measured = row.state[u] == code(DepthState::measured);
-    if (d > 0 && e2 * gate2_ < 1 && z <= range_) {
-      const float common = was_measured ? row.variance[u] - row.own_variance[u] : 0.0F;
-      const float farther = common > 0 ? z / row.depth[u] : 0.0F;  // common errors are those of 1/Z
-      row.depth[u] = z;
-      row.own_variance[u] = z * z * e2 * (1 + e2 * (18 + 400 * e2));
-      row.variance[u] = row.own_variance[u] + common * farther * farther * farther * farther;
-      row.state[u] = code(DepthState::measured);
-      return;
-    }
+    row.depth[u] = z;
+    row.own_variance[u] = z * z * e2 * (1 + e2 * (18 + 400 * e2));
+    row.variance[u] = row.own_variance[u] + z * z * common / (d * d);
+    row.state[u] = code(DepthState::measured);
+  }
+  /// What a pixel is that the views have seen without measuring it.
+  void refuse(const Row& row, int u, float sigma2) const {
     if (row.state[u] == code(DepthState::epipole)) return;
     const bool vague = sigma2 > kVague * kVague;
-    if (was_measured || vague) drop(row, u, vague ? DepthState::no_texture : DepthState::low_parallax);
+    if (row.state[u] == code(DepthState::measured) || vague) {
+      drop(row, u, vague ? DepthState::no_texture : DepthState::low_parallax);
+    }
     const bool low = row.state[u] == code(DepthState::low_parallax);
     if (low && row.bound[u] >= range_) row.state[u] = code(DepthState::far);
   }
@@ -198,9 +203,11 @@ void shorten_bounds(const cv::Mat& of_views, cv::Mat& bound) {
 
 }  // namespace
 
-void read_views(const ParallaxField& field, double scale, const DepthOptions& depth,
-                const ViewsDepthOptions& options, DepthImage& image) {
+void read_views(const ParallaxField& field, double scale, const CommonError& common,
+                const DepthOptions& depth, const ViewsDepthOptions& options, DepthImage& image) {
   const Reader reader(scale, depth, options);
+  const auto per_scale = static_cast<float>(1 / scale);
+  const auto scale2 = static_cast<float>(scale * scale);
   cv::Mat bounds(image.depth.size(), CV_32FC1, cv::Scalar(std::numeric_limits<float>::infinity()));
   for (int v = 0; v < image.depth.rows; ++v) {
     const Row row(image, v);
@@ -208,17 +215,25 @@ void read_views(const ParallaxField& field, double scale, const DepthOptions& de
     const auto* information = field.information.ptr<float>(v);
     const auto* spread = field.spread.ptr<float>(v);
     const auto* matching = field.matching.ptr<float>(v);
+    const auto* offset = field.offset.ptr<float>(v);
+    const auto* texture = field.texture.ptr<float>(v);
     auto* bound = bounds.ptr<float>(v);
     for (int u = 0; u < image.depth.cols; ++u) {
       if (is_blind(row.state[u])) continue;
-      if (!(information[u] > 0)) {
+      if (!(information[u] > 0) || !(texture[u] > kTexture)) {
         if (matching[u] > 0) Reader::drop(row, u, DepthState::no_texture);
         continue;
       }
-      const float sigma2 = reader.variance(d[u], information[u], matching[u], spread[u]);
-      bound[u] = reader.bound(d[u], sigma2);
+      const float sigma2 =
+          reader.variance(d[u], information[u], matching[u], spread[u]) + offset[u] * offset[u];
+      const float shared = scale2 * common(u, v, std::max(d[u], 0.0F) * per_scale);
+      bound[u] = reader.bound(d[u], sigma2 + shared);
       if (!(row.bound[u] >= bound[u])) row.bound[u] = bound[u];
-      reader.place(row, u, d[u], sigma2);
+      if (reader.is_measured(d[u], sigma2)) {
+        reader.place(row, u, d[u], sigma2, shared);
+      } else {
+        reader.refuse(row, u, sigma2);
+      }
     }
   }
   shorten_bounds(bounds, image.bound);

@@ -10,12 +10,13 @@
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
 #include "pade/depth/depth_options.hpp"
+#include "pade/depth/multi_view/common_error.hpp"
 
 namespace pade::depth {
 
 struct ViewsDepthOptions {
-  double sigma_scale = 1;
-  double relative_sigma = 0.005;
+  double sigma_scale = 0.75;
+  double relative_sigma = 0.001;
   double agreement = 0.15;
 
   template <class Self, class Visitor>
@@ -46,8 +47,8 @@ cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Ca
                        const InverseDepthImage& last, double baseline, const ViewsDepthOptions& options);
 
 /// Puts what several views say in place of what two say, where they say anything.
-/// @param field  their parallax. @param scale  d = scale / Z, px m.
-void read_views(const ParallaxField& field, double scale, const DepthOptions& depth,
-                const ViewsDepthOptions& options, DepthImage& image);
+/// @param field  their parallax. @param scale  d = scale / Z, px m. @param common  what their motions err.
+void read_views(const ParallaxField& field, double scale, const CommonError& common,
+                const DepthOptions& depth, const ViewsDepthOptions& options, DepthImage& image);
 
 }  // namespace pade::depth

@@ -13,8 +13,6 @@
 
 namespace pade::flow {
 
-class Plane;
-
 /// Another view. The point of pixel p (homogeneous, p~ = (x, y, 1)) at the distance d from infinity is seen
 /// at H p~ + d e, homogeneous. With K (R p_ray + t / Z): H = K R K^-1, e = K t per unit of d. Whoever knows
 /// the poses computes them; this room does not.
@@ -73,17 +71,21 @@ class MultiViewEstimator {
 
   /// @param reference  CV_8UC1. @param views  of its size.
   /// @param initial    CV_32FC1, d to start from; NaN = 0.
-  /// @param noise  standard deviation of the grey values, where it is known. Residuals count with 1 at least,
-  /// texture has to exceed 0.3 at least, and what the residual shows on the spot.
-  /// @return empty where there is no view, or sizes or types do not fit.
-  ParallaxField estimate(const cv::Mat& reference, const std::vector<View>& views, const cv::Mat& initial,
-                         double noise = 0);
+  /// @param noise  standard deviation of the grey values; 0 = not known. Residuals count with 1 at least.
+  /// @return empty if there is no view, or sizes or types do not fit. Its planes are the estimator's own:
+  /// valid until the next call.
+  const ParallaxField& estimate(const cv::Mat& reference, const std::vector<View>& views,
+                                const cv::Mat& initial, double noise = 0);
 
  private:
   struct Buffers;
-  [[nodiscard]] cv::Mat cost(const std::vector<View>& views, const Plane& distance);
+  void take(const cv::Mat& reference, const std::vector<View>& views, const cv::Mat& initial);
   void compete(const std::vector<View>& views);
+  void relax(const std::vector<View>& views);
+  void weigh(const std::vector<View>& views, float noise);
+  void find_texture(float noise);
   MultiViewOptions options_;
+  ParallaxField field_;
   std::unique_ptr<Buffers> buffers_;
 };
 

@@ -16,63 +16,11 @@ namespace {
 // As in confidence_kernels.cpp: the share of the gradients that a right match does not leave standing.
 constexpr float kWrong = 0.1F;
 constexpr float kSlack = 0.5F;
-constexpr float kNoiseGradients = 2.0F;
 // Squared slopes, per grey^2 of noise, that are no texture: noise alone makes 0.9.
 constexpr float kSlopeNoise = 1.5F;
-constexpr float kTruncated = 20;  // grey values: farther off is as wrong
+constexpr float kTruncated = 20;       // grey values: farther off is as wrong
+constexpr float kLeastNoise2 = 0.09F;  // grey values squared: that of rounding
 constexpr int kChannels = 6;
-constexpr int kMatchedRows = 3;
-
-long matched_line(int width) { return padded(width) + 2L * kRowMultiple; }
-
-struct Seen {
-  V x, y;    // where the view sees the pixels
-  I inside;  // of its image, and used
-
-  [[gnu::always_inline]] Seen(const ViewEvidence& e, int from_x, int from_y) {
-    const V ex = load(e.line.direction_x.row(from_y) + from_x);
-    const V ey = load(e.line.direction_y.row(from_y) + from_x);
-    const V d = load(e.distance.row(from_y) + from_x);
-    x = load(e.line.base_u.row(from_y) + from_x) + d * ex + (ramp() + static_cast<float>(from_x));
-    y = load(e.line.base_v.row(from_y) + from_x) + d * ey + static_cast<float>(from_y);
-    inside = I(x >= 0.0F) & I(y >= 0.0F) & I(x <= static_cast<float>(e.first.width - 1)) &
-             I(y <= static_cast<float>(e.first.height - 1)) & I(ex * ex + ey * ey > 0.0F);
-  }
-};
-
-// second(p') - first(p), row by row.
-class Residual {
- public:
-  Residual(const ViewEvidence& evidence, float* scratch, int first)
-      : e_(evidence), memory_(scratch), done_(first < 0 ? 0 : first) {}
-  static long floats(int width) { return kMatchedRows * matched_line(width); }
-
-  template <class Grey>
-  void advance(int last, const Grey& grey) {
-    const int width = e_.first.width;
-    const auto right = static_cast<float>(width - 1);
-    const auto bottom = static_cast<float>(e_.first.height - 1);
-    for (; done_ <= last && done_ < e_.first.height; ++done_) {
-      float* const line = slot(done_);
-      for (int x = 0; x < padded(width); x += kLanes) {
-        const Seen at(e_, x, done_);
-        const V warped =
-            bilinear(e_.second.data, e_.second.stride, clamp(at.x, 0, right), clamp(at.y, 0, bottom));
-        store(line + x, warped - load(grey[done_] + x));
-      }
-      repeat_edges(line, width, 1);
-    }
-  }
-  const float* operator[](int y) const { return slot(clamp_index(y, e_.first.height)); }
-
- private:
-  float* slot(int y) const {
-    return memory_ + (y % kMatchedRows) * matched_line(e_.first.width) + kRowMultiple;
-  }
-  const ViewEvidence& e_;
-  float* memory_;
-  int done_;
-};
 
 PADE_INLINE void add(float* to, V value, bool reset) { store(to, reset ? value : load(to) + value); }
 
@@ -100,125 +48,258 @@ struct Row {
     const V hy = g.H[3] * u + ry;
     const V hz = g.H[6] * u + rz;
     const V z = hz + d * g.e[2];
+    const V per_both = 1.0F / (z * hz);
+    const V per_hz = z * per_both;
     Point p;
-    p.per_z = 1.0F / z;
+    p.per_z = hz * per_both;
     p.x = (hx + d * g.e[0]) * p.per_z;
     p.y = (hy + d * g.e[1]) * p.per_z;
-    const V per_hz = 1.0F / hz;
     const V px = p.x - hx * per_hz;
     const V py = p.y - hy * per_hz;
     p.used = I(hz > 0.0F) & I(z > least_z * hz) & I(z < g.largest_scale * hz) &
              I(px * px + py * py <= g.largest_parallax2);
     return p;
   }
+  // dp'/dd
+  [[gnu::always_inline]] V along_x(const Point& p) const { return (g.e[0] - p.x * g.e[2]) * p.per_z; }
+  [[gnu::always_inline]] V along_y(const Point& p) const { return (g.e[1] - p.y * g.e[2]) * p.per_z; }
+};
+
+// A view's rows, warped to the reference, each once: row y of the image, also outside of it, at (y). Two rows
+// back and ahead of the last one that was asked for are there.
+template <bool kWithMean>
+class Warped {
+ public:
+  Warped(const ViewGeometry& view, PlaneView first, PlaneView second, PlaneView distance, float* scratch,
+         int row)
+      : view_(view),
+        first_(first),
+        second_(second),
+        distance_(distance),
+        memory_(scratch),
+        done_(row < 0 ? 0 : row) {}
+  static long floats(int width) { return kPlanes * kRows * line(width); }
+
+  // Makes rows up to `last` available.
+  [[gnu::always_inline]] void advance(int last) {
+    for (; done_ <= last && done_ < first_.height; ++done_) warp(done_);
+  }
+  const float* residual(int y) const { return slot(kResidual, y); }  // warped - first; 0 = not seen
+  const float* along_x(int y) const { return slot(kAlongX, y); }     // dp'/dd; 0 = not seen
+  const float* along_y(int y) const { return slot(kAlongY, y); }
+  const float* mean(int y) const { return slot(kMean, y); }  // of both images; the first's where not seen
+
+ private:
+  static constexpr int kRows = 5;
+  enum { kResidual, kAlongX, kAlongY, kMean };
+  static constexpr int kPlanes = kWithMean ? 4 : 3;
+  static long line(int width) { return padded(width) + 2L * kRowMultiple; }
+
+  float* slot(int plane, int y) const {
+    const int row = clamp_index(y, first_.height) % kRows;
+    return memory_ + (plane * kRows + row) * line(first_.width) + kRowMultiple;
+  }
+  [[gnu::always_inline]] void warp(int y) {
+    const Row row(view_, y);
+    const auto right = static_cast<float>(first_.width - 1);
+    const auto bottom = static_cast<float>(first_.height - 1);
+    for (int x = 0; x < padded(first_.width); x += kLanes) {
+      const Point at = row.at(ramp() + static_cast<float>(x), load(distance_.row(y) + x));
+      const V inside_x = clamp(at.x, 0, right);
+      const V inside_y = clamp(at.y, 0, bottom);
+      const I seen = at.used & I(inside_x == at.x) & I(inside_y == at.y);
+      const V here = load(first_.row(y) + x);
+      const V there = bilinear(second_.data, second_.stride, inside_x, inside_y);
+      store(slot(kResidual, y) + x, select(seen, there - here, V{}));
+      store(slot(kAlongX, y) + x, select(seen, row.along_x(at), V{}));
+      store(slot(kAlongY, y) + x, select(seen, row.along_y(at), V{}));
+      if constexpr (kWithMean) store(slot(kMean, y) + x, select(seen, 0.5F * (here + there), here));
+    }
+    repeat_edges(slot(kResidual, y), first_.width, 4);
+    if constexpr (kWithMean) repeat_edges(slot(kMean, y), first_.width, 4);
+  }
+  const ViewGeometry& view_;
+  PlaneView first_, second_, distance_;
+  float* memory_;
+  int done_;
 };
 
 }  // namespace
 
-void view_lines(const ViewGeometry& view, PlaneView distance, const EpipolarLevel& line, int first,
-                int last) {
+long tensor_scratch(int radius, int width) {
+  return window_scratch(3, radius, width) + Warped<true>::floats(width);
+}
+
+void view_tensor(const ViewGeometry& view, const ViewTensor& t, bool reset, int first, int last,
+                 float* scratch) {
+  const int width = t.first.width;
+  const int n = padded(width);
+  const int begin = first - t.radius < 0 ? 0 : first - t.radius;
+  Warped<true> warped(view, t.first, t.second, t.distance, scratch + window_scratch(3, t.radius, width),
+                      begin - 2);
+  with_radius(t.radius, [&](auto radius) {
+    windowed<3>(
+        first, last, width, t.first.height, t.taps, radius, scratch,
+        [&](int y, float* const* out) {
+          warped.advance(y + 2);
+          const float* const far_above = warped.mean(y - 2);
+          const float* const above = warped.mean(y - 1);
+          const float* const here = warped.mean(y);
+          const float* const below = warped.mean(y + 1);
+          const float* const far_below = warped.mean(y + 2);
+          const float* const r = warped.residual(y);
+          const float* const r_above = warped.residual(y - 1);
+          const float* const r_below = warped.residual(y + 1);
+          const float* const along_x_of = warped.along_x(y);
+          const float* const along_y_of = warped.along_y(y);
+          for (int x = 0; x < n; x += kLanes) {
+            const V ex = load(along_x_of + x);
+            const V ey = load(along_y_of + x);
+            const V gx = along_x(here + x);
+            const V gy =
+                five_point(load(far_above + x), load(above + x), load(below + x), load(far_below + x));
+            const V a = gx * ex + gy * ey;
+            const V gt = load(r + x);
+            // The derivatives of a, and those of the residual: constancy of the gradient.
+            const V gxy = 0.25F * ((load(below + x + 1) - load(below + x - 1)) -
+                                   (load(above + x + 1) - load(above + x - 1)));
+            const V twice = 2.0F * load(here + x);
+            const V ax = (load(here + x + 1) - twice + load(here + x - 1)) * ex + gxy * ey;
+            const V ay = gxy * ex + (load(below + x) - twice + load(above + x)) * ey;
+            const V xt = 0.5F * (load(r + x + 1) - load(r + x - 1));
+            const V yt = 0.5F * (load(r_below + x) - load(r_above + x));
+            store(out[0] + x, a * a + t.gamma * (ax * ax + ay * ay));
+            store(out[1] + x, a * gt + t.gamma * (ax * xt + ay * yt));
+            store(out[2] + x, gt * gt + t.gamma * (xt * xt + yt * yt));
+          }
+        },
+        [&](int y, float* const* line, const float* taps) {
+          for (int x = 0; x < n; x += kLanes) {
+            const V residual = convolve_horizontal(line[2] + x, taps, radius);
+            const V psi = 1.0F / sqrt(residual + t.epsilon2);
+            add(t.sum11.row(y) + x, psi * convolve_horizontal(line[0] + x, taps, radius), reset);
+            add(t.sum13.row(y) + x, psi * convolve_horizontal(line[1] + x, taps, radius), reset);
+          }
+        });
+  });
+}
+
+void view_costs(const ViewGeometry& view, const ViewCosts& c, bool reset, int first, int last) {
+  const auto right = static_cast<float>(c.first.width - 1);
+  const auto bottom = static_cast<float>(c.first.height - 1);
   for (int y = first; y < last; ++y) {
     const Row row(view, y);
-    for (int x = 0; x < padded(distance.width); x += kLanes) {
+    for (int x = 0; x < padded(c.first.width); x += kLanes) {
       const V u = ramp() + static_cast<float>(x);
-      const V d = load(distance.row(y) + x);
-      const Point at = row.at(u, d);
-      const V dx = (row.g.e[0] - at.x * row.g.e[2]) * at.per_z;
-      const V dy = (row.g.e[1] - at.y * row.g.e[2]) * at.per_z;
-      store(line.direction_x.row(y) + x, select(at.used, dx, V{}));
-      store(line.direction_y.row(y) + x, select(at.used, dy, V{}));
-      store(line.base_u.row(y) + x, select(at.used, at.x - u - d * dx, V{}));
-      store(line.base_v.row(y) + x, select(at.used, at.y - row.v - d * dy, V{}));
-    }
-  }
-}
-
-void view_cost(const ViewGeometry& view, PlaneView reference, PlaneView seen, PlaneView distance,
-               PlaneView cost, PlaneView count, bool reset, int first, int last) {
-  const auto right = static_cast<float>(distance.width - 1);
-  const auto bottom = static_cast<float>(distance.height - 1);
-  for (int y = first; y < last; ++y) {
-    const Row row(view, y);
-    for (int x = 0; x < padded(distance.width); x += kLanes) {
-      const Point at = row.at(ramp() + static_cast<float>(x), load(distance.row(y) + x));
-      const V inside_x = clamp(at.x, 0, right);
-      const V inside_y = clamp(at.y, 0, bottom);
-      const I inside = at.used & I(inside_x == at.x) & I(inside_y == at.y);
-      const V r = abs(bilinear(seen.data, seen.stride, inside_x, inside_y) - load(reference.row(y) + x));
-      add(cost.row(y) + x, select(inside, min(r, set(kTruncated)), V{}), reset);
-      add(count.row(y) + x, select(inside, set(1.0F), V{}), reset);
-    }
-  }
-}
-
-void view_add(const ViewTensor& t, bool reset, int first, int last) {
-  for (int y = first; y < last; ++y) {
-    for (int x = 0; x < padded(t.j11.width); x += kLanes) {
-      const V psi = 1.0F / sqrt(load(t.j33.row(y) + x) + t.epsilon2);
-      add(t.sum11.row(y) + x, psi * load(t.j11.row(y) + x), reset);
-      add(t.sum13.row(y) + x, psi * load(t.j13.row(y) + x), reset);
+      const V grey = load(c.first.row(y) + x);
+      const V own = load(c.distance[0].row(y) + x);
+      const auto cost_of = [&](V d, V& cost, V& count) {
+        const Point at = row.at(u, d);
+        const V inside_x = clamp(at.x, 0, right);
+        const V inside_y = clamp(at.y, 0, bottom);
+        const I inside = at.used & I(inside_x == at.x) & I(inside_y == at.y);
+        const V r = abs(bilinear(c.second.data, c.second.stride, inside_x, inside_y) - grey);
+        cost = select(inside, min(r, set(kTruncated)), V{});
+        count = select(inside, set(1.0F), V{});
+      };
+      V cost[ViewCosts::kRivals];
+      V count[ViewCosts::kRivals];
+      cost_of(own, cost[0], count[0]);
+      for (int i = 1; i < ViewCosts::kRivals; ++i) {
+        const V d = load(c.distance[i].row(y) + x);
+        const I same = I(abs(d - own) <= c.same);
+        cost[i] = cost[0];
+        count[i] = count[0];
+        if (all(same)) continue;
+        V other;
+        V seen;
+        cost_of(d, other, seen);
+        cost[i] = select(same, cost[0], other);
+        count[i] = select(same, count[0], seen);
+      }
+      for (int i = 0; i < ViewCosts::kRivals; ++i) {
+        add(c.cost[i].row(y) + x, cost[i], reset);
+        add(c.count[i].row(y) + x, count[i], reset);
+      }
     }
   }
 }
 
 long evidence_scratch(int radius, int width) {
-  return window_scratch(kChannels, radius, width) + Lines<5>::floats(width) + Residual::floats(width);
+  return window_scratch(kChannels, radius, width) + Lines<5>::floats(width) + Warped<false>::floats(width);
 }
 
-void view_evidence(const ViewEvidence& e, bool reset, int first, int last, float* scratch) {
+void view_evidence(const ViewGeometry& view, const ViewEvidence& e, bool reset, int first, int last,
+                   float* scratch) {
   const int width = e.first.width;
   const int n = padded(width);
   const int begin = first - e.radius < 0 ? 0 : first - e.radius;
   float* const lines = scratch + window_scratch(kChannels, e.radius, width);
   Lines<5> grey(e.first, lines, begin - 2);
-  Residual residual(e, lines + Lines<5>::floats(width), begin - 1);
+  Warped<false> warped(view, e.first, e.second, e.distance, lines + Lines<5>::floats(width), begin - 1);
   with_radius(e.radius, [&](auto radius) {
     windowed<kChannels>(
         first, last, width, e.first.height, e.taps, radius, scratch,
         [&](int y, float* const* out) {
           grey.advance(y + 2);
-          residual.advance(y + 1, grey);
+          warped.advance(y + 1);
+          const float* const residual = warped.residual(y);
+          const float* const above = warped.residual(y - 1);
+          const float* const below = warped.residual(y + 1);
+          const float* const along_x_of = warped.along_x(y);
+          const float* const along_y_of = warped.along_y(y);
           for (int x = 0; x < n; x += kLanes) {
             const V gx = along_x(grey[y] + x);
             const V gy = five_point(load(grey[y - 2] + x), load(grey[y - 1] + x), load(grey[y + 1] + x),
                                     load(grey[y + 2] + x));
-            const V a = gx * load(e.line.direction_x.row(y) + x) + gy * load(e.line.direction_y.row(y) + x);
-            const V r = load(residual[y] + x);
-            const V rx = 0.5F * (load(residual[y] + x + 1) - load(residual[y] + x - 1));
-            const V ry = 0.5F * (load(residual[y + 1] + x) - load(residual[y - 1] + x));
+            const V ex = load(along_x_of + x);
+            const V ey = load(along_y_of + x);
+            const V a = gx * ex + gy * ey;
+            const V r = load(residual + x);
+            const V rx = 0.5F * (load(residual + x + 1) - load(residual + x - 1));
+            const V ry = 0.5F * (load(below + x) - load(above + x));
+            const V along = rx * ex + ry * ey;
             store(out[0] + x, a * a);
             store(out[1] + x, a * r);
-            store(out[2] + x, gx * gx + gy * gy);
-            store(out[3] + x, r);
-            store(out[4] + x, r * r);
-            store(out[5] + x, rx * rx + ry * ry);
+            store(out[2] + x, r);
+            store(out[3] + x, r * r);
+            store(out[4] + x, along * along);
+            store(out[5] + x, a * a * load(e.distance.row(y) + x));
           }
         },
         [&](int y, float* const* line, const float* taps) {
+          const Row row(view, y);
+          const auto right = static_cast<float>(width - 1);
+          const auto bottom = static_cast<float>(e.first.height - 1);
           for (int x = 0; x < n; x += kLanes) {
             V sum[kChannels];
             for (int c = 0; c < kChannels; ++c) sum[c] = convolve_horizontal(line[c] + x, taps, radius);
-            const V variance = max(sum[4] - sum[3] * sum[3], set(e.noise * e.noise));
-            const Seen at(e, x, y);
-            const V dx = at.x - (ramp() + static_cast<float>(x));
+            const V u = ramp() + static_cast<float>(x);
+            const V d = load(e.distance.row(y) + x);
+            const Point at = row.at(u, d);
+            const I seen = at.used & I(at.x >= 0.0F) & I(at.y >= 0.0F) & I(at.x <= right) & I(at.y <= bottom);
+            const V dx = at.x - u;
             const V dy = at.y - static_cast<float>(y);
-            const V noise2 = set(kNoiseGradients * e.noise * e.noise);
             const V limit = set(kWrong) + set(kSlack) / (1.0F + sqrt(dx * dx + dy * dy));
-            const I bad = I(sum[5] - noise2 > limit * (2.0F * sum[2] + noise2));
-            const I good = at.inside & ~bad;
-            const V ex = load(e.line.direction_x.row(y) + x);
-            const V ey = load(e.line.direction_y.row(y) + x);
-            // Noise of the image, or more where the residual shows more.
-            const V here = max(sum[5] / kNoiseGradients, set(e.image_noise * e.image_noise));
-            const V of_noise = kSlopeNoise * here * (ex * ex + ey * ey);
-            const I texture = I(sum[0] > of_noise);
-            const V information = select(good & texture, e.effective_size * sum[0] / variance, V{});
-            const V step = select(I(sum[0] > 0.0F), -sum[1] / max(sum[0], set(1e-9F)), V{});
+            const V ex = row.along_x(at);
+            const V ey = row.along_y(at);
+            const V ee = ex * ex + ey * ey;
+            const V noise2 = e.noise * e.noise * ee;
+            const I good = seen & ~I(sum[4] - noise2 > limit * (2.0F * sum[0] + noise2));
+            // Texture is what noise cannot be, as far as the residual shows it on the spot.
+            const I texture = good & I(sum[0] > kSlopeNoise * max(sum[4], kLeastNoise2 * ee));
+            const V variance = max(sum[3] - sum[2] * sum[2], set(e.noise * e.noise));
+            const V information = select(texture, e.effective_size * sum[0] / variance, V{});
+            const V per_energy = 1.0F / max(sum[0], set(1e-9F));
+            const V step = -sum[1] * per_energy;
+            add(e.offset.row(y) + x, information * (sum[5] * per_energy - d), reset);
             add(e.information.row(y) + x, information, reset);
             add(e.step.row(y) + x, information * step, reset);
             add(e.step2.row(y) + x, information * step * step, reset);
             add(e.matching.row(y) + x, select(good, set(1.0F), V{}), reset);
-            add(e.wrong.row(y) + x, select(at.inside & bad, set(1.0F), V{}), reset);
+            const V per_ee = 1.0F / max(ee, set(1e-9F));
+            add(e.texture.row(y) + x, select(good, sum[0] * per_ee, V{}), reset);
+            add(e.left.row(y) + x, select(good, sum[4] * per_ee, V{}), reset);
           }
         });
   });

@@ -16,41 +16,53 @@ struct ViewGeometry {
   float largest_scale = 1;      ///< nor those that come nearer or go farther by more than this
 };
 
-/// One view's tensors, and the sums over all views.
+/// What one view adds to the sums over all views, of the data term about the present distance.
 struct ViewTensor {
-  PlaneView j11, j13, j33;  ///< of this view
-  PlaneView sum11, sum13;   ///< robustly weighted sums
-  float epsilon2 = 1;       ///< of the robust weight
+  PlaneView first, second;
+  PlaneView distance;
+  PlaneView sum11, sum13;  ///< of the tensors, robustly weighted
+  const float* taps = nullptr;
+  int radius = 0;
+  float gamma = 0;
+  float epsilon2 = 1;  ///< of the robust weight
+};
+
+/// Truncated residuals at a pixel's own distance and at those that compete with it.
+struct ViewCosts {
+  static constexpr int kRivals = 3;  ///< the first of them is the pixel's own
+  PlaneView first, second;
+  PlaneView distance[kRivals];
+  PlaneView cost[kRivals], count[kRivals];  ///< sums, and numbers of views that see the pixel
+  float same = 0;                           ///< distances that differ by no more than this cost the same
 };
 
 /// What the views say at the solution.
 struct ViewEvidence {
-  EpipolarLevel line;  ///< of this view
   PlaneView first, second;
-  PlaneView distance;         ///< solution
-  PlaneView information;      ///< sum over the views of 1 / sigma^2 of the distance
-  PlaneView step, step2;      ///< sums of information * step and * step^2 that each view asks for
-  PlaneView matching, wrong;  ///< numbers of views that match, and that do not
+  PlaneView distance;     ///< solution
+  PlaneView information;  ///< sum over the views of 1 / sigma^2 of the distance
+  PlaneView step, step2;  ///< sums of information * step and * step^2 that each view asks for
+  PlaneView offset;       ///< sum of information * (distance of the texture around - a pixel's own)
+  PlaneView matching;     ///< number of views that match
+  /// Over these views, sums of the mean squared slopes along the line, per px: of the image, and of what is
+  /// left of it after the match.
+  PlaneView texture, left;
   const float* taps = nullptr;
   int radius = 0;
-  float noise = 1;        ///< of the residual's variance, grey values, at least
-  float image_noise = 0;  ///< of the image, as far as it is known
+  float noise = 1;  ///< of the residual's variance, grey values, at least
   float effective_size = 1;
 };
 
-/// Linearises the lines of a view about `distance`: p + base + d * direction. Zero where the view is not
-/// used.
-PADE_DECLARE_KERNEL(void view_lines(const ViewGeometry& view, PlaneView distance, const EpipolarLevel& line,
-                                    int first, int last))
-/// Adds a view's truncated residual at `distance`, and whether it has one.
-PADE_DECLARE_KERNEL(void view_cost(const ViewGeometry& view, PlaneView reference, PlaneView seen,
-                                   PlaneView distance, PlaneView cost, PlaneView count, bool reset, int first,
-                                   int last))
-/// Adds one view's tensor, robustly; `reset` starts the sums.
-PADE_DECLARE_KERNEL(void view_add(const ViewTensor& tensor, bool reset, int first, int last))
+/// Adds one view's tensor, robustly; `reset` starts the sums. `scratch`: tensor_scratch() floats.
+PADE_DECLARE_KERNEL(void view_tensor(const ViewGeometry& view, const ViewTensor& tensor, bool reset,
+                                     int first, int last, float* scratch))
+PADE_DECLARE_KERNEL(long tensor_scratch(int radius, int width))
+/// Adds a view's truncated residuals, and whether it has them.
+PADE_DECLARE_KERNEL(void view_costs(const ViewGeometry& view, const ViewCosts& costs, bool reset, int first,
+                                    int last))
 /// Adds one view's evidence; `reset` starts the sums. `scratch`: evidence_scratch() floats.
-PADE_DECLARE_KERNEL(void view_evidence(const ViewEvidence& evidence, bool reset, int first, int last,
-                                       float* scratch))
+PADE_DECLARE_KERNEL(void view_evidence(const ViewGeometry& view, const ViewEvidence& evidence, bool reset,
+                                       int first, int last, float* scratch))
 PADE_DECLARE_KERNEL(long evidence_scratch(int radius, int width))
 
 }  // namespace pade::flow
