@@ -12,6 +12,7 @@ set(pade_public_headers
   core/depth_image.hpp
   core/flow_field.hpp
   core/frame.hpp
+  core/health.hpp
   core/lie.hpp
   core/options.hpp
   core/pose.hpp

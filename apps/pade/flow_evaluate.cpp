@@ -215,7 +215,8 @@ void add_flow_evaluate(CLI::App& flow, Context& context) {
   CLI::App* command = flow.add_subcommand("evaluate", "Compares methods on image pairs with known flow.");
   auto arguments = std::make_shared<FlowEvaluateArguments>();
   command->footer(
-      "A folder holds pairs as Middlebury and KITTI lay them out, or is a sequence with true depth and "
+      "A folder holds pairs as Middlebury, KITTI and Sintel lay them out, or is a sequence with true depth "
+      "and "
       "poses, "
       "from which\nthe flow of a static scene follows.\n\n"
       "  pade flow evaluate middlebury --flow clg-fast,dis-medium --repeat 9\n"

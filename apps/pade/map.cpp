@@ -249,7 +249,8 @@ void add_map(CLI::App& app, Context& context) {
   auto a = std::make_shared<MapArguments>();
   CLI::App* map = app.add_subcommand("map", "Map a recorded flight: depth images and an obstacle map.");
   map->footer(
-      "SEQUENCE is a folder in the TUM RGB-D, EuRoC or KITTI odometry layout (docs/sequences.md).\n"
+      "SEQUENCE is a folder in the TUM RGB-D, EuRoC, KITTI odometry, TartanAir or ICL-NUIM layout\n"
+      "(docs/sequences.md).\n"
       "The run folder holds map.bt and map.ot (octovis), map.json, cloud.ply, trajectory.txt, run.json, "
       "timing.json,\n"
       "report.html and, if the flight has true depth, evaluation.json and .csv.\n"

@@ -13,6 +13,7 @@
 #include "pade/checks/run_hints.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
+#include "pade/io/run/health_json.hpp"
 #include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
@@ -106,42 +107,15 @@ Result<NavigationRunOptions> run_options(const NavigateArguments& arguments, con
 
 using Score = std::optional<evaluation::MotionSummary>;
 
-std::size_t frames_lost(const NavigationRun& run) {
-  return static_cast<std::size_t>(std::count_if(
-      run.frames.begin(), run.frames.end(),
-      [](const NavigationFrame& frame) { return frame.status == navigation::NavigationStatus::lost; }));
-}
-
-nlohmann::json summary(const NavigationRun& run, const Score& score, const std::vector<Hint>& hints) {
-  nlohmann::json sensors = nlohmann::json::array();
-  for (const auto& sensor : run.sensors) {
-    sensors.push_back({{"sensor", sensor.sensor},
-                       {"measurements", sensor.measurements},
-                       {"refused", sensor.refused},
-                       {"chi_square_per_component", sensor.chi_square}});
-  }
-  nlohmann::json list = nlohmann::json::array();
+nlohmann::ordered_json summary(const NavigationRun& run, const Score& score, const std::vector<Hint>& hints) {
+  nlohmann::ordered_json json = io::json_of(run.health);
+  json["hints"] = nlohmann::ordered_json::array();
   for (const Hint& hint : hints) {
-    list.push_back({{"id", hint.id},
-                    {"severity", std::string(to_name(hint.severity))},
-                    {"message", hint.message},
-                    {"advice", hint.advice}});
+    json["hints"].push_back({{"id", hint.id},
+                             {"severity", to_name(hint.severity)},
+                             {"message", hint.message},
+                             {"advice", hint.advice}});
   }
-  nlohmann::json json = {{"status", std::string(to_name(run.health.status))},
-                         {"frames", run.frames.size()},
-                         {"frames_without_answer", run.frames_without_answer},
-                         {"imu_refused", run.health.imu_refused},
-                         {"imu_gaps", run.health.imu_gaps},
-                         {"measurements_too_late", run.health.too_late},
-                         {"measurements_repeated", run.health.duplicates},
-                         {"measurements_unusable", run.health.unusable},
-                         {"restarts", run.health.restarts},
-                         {"restarts_when_lost", run.health.restarts_when_lost},
-                         {"times_lost", run.health.times_lost},
-                         {"velocity_doubted", run.health.velocity_doubted},
-                         {"frames_lost", frames_lost(run)},
-                         {"sensors", std::move(sensors)},
-                         {"hints", std::move(list)}};
   if (score) {
     json["against_truth"] = {{"pairs", score->pairs},
                              {"translation_median_m", score->translation_median},
@@ -175,7 +149,7 @@ Status navigate(const NavigateArguments& arguments) {
   if (run.frames.empty()) return never_aligned(arguments.log, *checked, run);
   const std::vector<Hint> hints = all_hints(*checked, run);
   const Score score = score_motions(*log, *options, run);
-  nlohmann::json json = summary(run, score, hints);
+  nlohmann::ordered_json json = summary(run, score, hints);
   json["remarks"] = log->remarks;
   const std::string title = "Navigation of " + std::filesystem::path(arguments.log).filename().string();
   for (const auto& [file, content] :
@@ -192,9 +166,13 @@ Status navigate(const NavigateArguments& arguments) {
   }
   fmt::print("{}", evaluation::to_table(hints));
   for (const std::string& remark : log->remarks) fmt::print("{}\n", remark);
-  fmt::print("{} frames, {} of them lost, {} without a pose; status at the end: {}\n", run.frames.size(),
-             frames_lost(run), run.frames_without_answer, to_name(run.health.status));
-  for (const auto& sensor : run.sensors) {
+  const NavigationHealth& health = run.health;
+  fmt::print(
+      "{} frames, {} of them lost, {} without a pose; status at the end: {}; speed {:.1f} m/s median, {:.1f} "
+      "largest\n",
+      health.frames, health.frames_lost, health.frames_without_answer, to_name(health.filter.status),
+      health.speed_median, health.speed_largest);
+  for (const auto& sensor : health.sensors) {
     fmt::print("{}: {} measurements, {} refused, mean χ² {:.2f} per component (1 is consistent)\n",
                sensor.sensor, sensor.measurements, sensor.refused, sensor.chi_square);
   }

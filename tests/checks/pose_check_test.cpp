@@ -45,6 +45,11 @@ Pose row_in(PoseConvention convention, const Pose& T_world_camera) {
       return about(R);
     case PoseConvention::millimetres:
       return Pose{T_world_camera.rotation, 1000 * T_world_camera.translation};
+    case PoseConvention::left_handed: {
+      const Eigen::DiagonalMatrix<double, 3> turn(1, -1, 1);
+      return Pose{Eigen::Quaterniond(Eigen::Matrix3d(turn * T_world_camera.matrix3() * turn)),
+                  turn * T_world_camera.translation};
+    }
     default:
       return T_world_camera;
   }

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "pade/navigation/plausibility/force_match.hpp"
+#include "pade/navigation/plausibility/position_lag.hpp"
 #include "pade/navigation/replay.hpp"
 
 #include "navigation/flight.hpp"
@@ -28,11 +29,14 @@ NavigationLog good(double speed = 1, std::uint64_t seed = 1) {
 
 auto has(const char* id) { return Contains(Field(&Hint::id, id)); }
 
-/// The lag that a hint names, from its advice "... (--gnss-latency 0.25) ...".
+/// The lag that a hint names: "the GNSS velocities are 0.25 s late ...".
 double lag_of(const std::vector<Hint>& hints) {
+  constexpr std::string_view kBefore = "velocities are ";
   for (const Hint& hint : hints) {
-    const std::size_t at = hint.advice.find("--gnss-latency ");
-    if (hint.id == "gnss-lag" && at != std::string::npos) return std::stod(hint.advice.substr(at + 15));
+    const std::size_t at = hint.message.find(kBefore);
+    if (hint.id != "gnss-lag" || at == std::string::npos) continue;
+    const double lag = std::stod(hint.message.substr(at + kBefore.size()));
+    return hint.message.find(" s early") == std::string::npos ? lag : -lag;
   }
   return 0;
 }
@@ -83,6 +87,56 @@ TEST(LogCheck, MeasuresTheLagOfTheGnss) {
     for (GnssVelocity& v : log.gnss.velocities) v.time.nanoseconds += Time::from_seconds(lag).nanoseconds;
     EXPECT_NEAR(lag_of(check_log(log)), lag, 0.06);
   }
+}
+
+TEST(LogCheck, MeasuresTheLagOfThePositionsAlone) {
+  for (const double lag : {0.2, 0.3, -0.3, 1.0}) {
+    auto log = record({.rest = 2, .speed = 2}, 120, simulation::ImuModel::consumer(),
+                      simulation::GnssModel::single_point(), 1);
+    for (GnssFix& fix : log.gnss.fixes) fix.time.nanoseconds += Time::from_seconds(lag).nanoseconds;
+    const auto measured = position_lag(log.gnss);
+    ASSERT_TRUE(measured) << lag;
+    EXPECT_NEAR(measured->seconds, lag, std::max(0.02, 4 * measured->sigma));
+    EXPECT_LT(measured->sigma, 0.06);
+    const auto hints = check_log(log);
+    EXPECT_THAT(hints, has("gnss-apart")) << lag;
+    EXPECT_THAT(hints, Not(has("gnss-lag"))) << "the velocities are punctual";
+  }
+}
+
+TEST(LogCheck, TellsWhatIsLate) {
+  // Both are late by 0.5 s, the positions by another 0.3 s.
+  auto log = record({.rest = 2, .speed = 2}, 120, simulation::ImuModel::consumer(),
+                    simulation::GnssModel::single_point(), 1);
+  for (GnssVelocity& v : log.gnss.velocities) v.time.nanoseconds += 500'000'000;
+  for (GnssFix& fix : log.gnss.fixes) fix.time.nanoseconds += 800'000'000;
+  const auto hints = check_log(log);
+  const auto late =
+      std::find_if(hints.begin(), hints.end(), [](const Hint& h) { return h.id == "gnss-apart"; });
+  ASSERT_NE(late, hints.end());
+  const auto after = [&](const std::string& option) {
+    return std::stod(late->advice.substr(late->advice.find(option) + option.size()));
+  };
+  EXPECT_NEAR(after("--gnss-latency "), 0.8, 0.12) << late->advice;
+  EXPECT_NEAR(after("--gnss-velocity-latency "), 0.5, 0.06) << late->advice;
+  EXPECT_NEAR(lag_of(hints), 0.5, 0.06);
+  for (const Hint& hint : hints) {
+    if (hint.id != "gnss-lag") continue;
+    EXPECT_THAT(hint.advice, Not(testing::HasSubstr("--gnss-latency")))
+        << "which would move the positions by the same";
+  }
+}
+
+TEST(LogCheck, TellsVelocitiesThatAreLateFromPositionsThatAreEarly) {
+  auto log = record({.rest = 2, .speed = 2}, 120, simulation::ImuModel::consumer(),
+                    simulation::GnssModel::carrier_phase(), 1);
+  for (GnssVelocity& v : log.gnss.velocities) v.time.nanoseconds += 120'000'000;
+  const auto hints = check_log(log);
+  const auto apart =
+      std::find_if(hints.begin(), hints.end(), [](const Hint& h) { return h.id == "gnss-apart"; });
+  ASSERT_NE(apart, hints.end());
+  EXPECT_THAT(apart->message, testing::HasSubstr("the GNSS velocities are 0.12 s late"));
+  EXPECT_THAT(apart->advice, testing::HasSubstr("--gnss-latency 0.00 --gnss-velocity-latency 0.12"));
 }
 
 TEST(LogCheck, KnowsLeapSeconds) {

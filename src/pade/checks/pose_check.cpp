@@ -205,6 +205,10 @@ std::string explain(PoseConvention convention) {
              "not know it";
     case PoseConvention::millimetres:
       return "the positions look like millimetres where metres are expected";
+    case PoseConvention::left_handed:
+      return "camera and world look left-handed (x right, y up, z forward, as ICL-NUIM has them): the sign "
+             "of y is to be "
+             "turned in both";
     case PoseConvention::row_before:
       return "the poses look one frame late: each image fits the row of the frame before it";
     case PoseConvention::row_after:
@@ -269,8 +273,8 @@ void judge(PoseCheck& check) {
 
 std::string_view name_of(PoseConvention convention) {
   constexpr std::array<std::string_view, pose_conventions.size()> names = {
-      "as given",     "inverted",      "inverse relative", "GL axes",    "FRD axes", "FLU axes",
-      "scalar first", "images turned", "millimetres",      "row before", "row after"};
+      "as given",     "inverted",      "inverse relative", "GL axes",     "FRD axes",   "FLU axes",
+      "scalar first", "images turned", "millimetres",      "left handed", "row before", "row after"};
   return names[static_cast<std::size_t>(convention)];
 }
 
@@ -301,6 +305,12 @@ Pose relative_pose(PoseConvention convention, const Pose& a, const Pose& b) {
       Pose motion = b.inverse() * a;
       motion.translation *= 1e-3;
       return motion;
+    }
+    case PoseConvention::left_handed: {
+      const Pose motion = b.inverse() * a;
+      const Eigen::Quaterniond& q = motion.rotation;
+      const Vector3d& t = motion.translation;
+      return {Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z()), Vector3d(t.x(), -t.y(), t.z())};
     }
     case PoseConvention::as_given:
     case PoseConvention::row_before:

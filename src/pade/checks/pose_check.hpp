@@ -28,6 +28,7 @@ enum class PoseConvention {
   scalar_first,      ///< quaternions w x y z in place of x y z w
   images_turned,     ///< the images stand on their head: a camera mounted upside down
   millimetres,       ///< positions a thousand times too large
+  left_handed,       ///< camera and world have y up, as ICL-NUIM's
   row_before,        ///< the rows run one frame late: the row of an image is that of the frame before
   row_after,         ///< and one frame early
 };
@@ -35,7 +36,7 @@ inline constexpr std::array pose_conventions = {
     PoseConvention::as_given,     PoseConvention::inverted,      PoseConvention::inverse_relative,
     PoseConvention::gl_axes,      PoseConvention::frd_axes,      PoseConvention::flu_axes,
     PoseConvention::scalar_first, PoseConvention::images_turned, PoseConvention::millimetres,
-    PoseConvention::row_before,   PoseConvention::row_after};
+    PoseConvention::left_handed,  PoseConvention::row_before,    PoseConvention::row_after};
 /// "as given", "inverted", ...
 std::string_view name_of(PoseConvention convention);
 

@@ -2,17 +2,12 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "pade/core/health.hpp"
+
 namespace pade::io {
-
-/// One piece of input that could not be used although the rest can (docs/sequences.md: skipped, not refused).
-struct Skipped {
-  std::string file;    ///< path as read, or relative to the sequence if it lies inside
-  std::string reason;  ///< line or field, what was found, what was expected
-
-  bool operator==(const Skipped&) const = default;
-};
 
 /// What a reader had to say beside its result.
 struct ReadReport {

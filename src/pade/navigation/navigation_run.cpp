@@ -32,6 +32,20 @@ std::span<const FrameMotion> longest_chain(std::span<const FrameMotion> motions)
   return longest;
 }
 
+/// What the frames of a run say: how many, how fast.
+void count_frames(NavigationRun& run) {
+  std::vector<double> speeds;
+  for (const NavigationFrame& frame : run.frames) {
+    speeds.push_back(frame.pose.velocity.norm());
+    run.health.frames_lost += frame.status == navigation::NavigationStatus::lost ? 1 : 0;
+  }
+  run.health.frames = speeds.size();
+  if (speeds.empty()) return;
+  std::sort(speeds.begin(), speeds.end());
+  run.health.speed_median = speeds[speeds.size() / 2];
+  run.health.speed_largest = speeds.back();
+}
+
 }  // namespace
 
 NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOptions& options) {
@@ -51,7 +65,7 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
       const Time t = frames[next];
       const auto pose = navigator.absolute_pose(t);
       if (pose.answer != Answer::valid) {
-        ++run.frames_without_answer;
+        ++run.health.frames_without_answer;
         continue;
       }
       if (next > 0 && !run.frames.empty() && run.frames.back().time == frames[next - 1]) {
@@ -61,9 +75,10 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
       run.frames.push_back({t, pose, navigator.health().status});
     }
   });
-  run.frames_without_answer += frames.size() - next;
-  run.health = navigator.health();
-  run.sensors = navigation::summarise(run.measurements);
+  run.health.frames_without_answer += frames.size() - next;
+  run.health.filter = navigator.health();
+  run.health.sensors = navigation::summarise(run.measurements);
+  count_frames(run);
   return run;
 }
 

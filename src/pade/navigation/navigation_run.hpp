@@ -39,9 +39,7 @@ struct NavigationRun {
   std::vector<NavigationFrame> frames;                ///< only those with an answer
   std::vector<FrameMotion> motions;                   ///< of neighbouring frames with an answer
   std::vector<navigation::Measurement> measurements;  ///< each with its last innovation
-  navigation::Health health;
-  std::vector<navigation::SensorSummary> sensors;
-  std::size_t frames_without_answer = 0;
+  NavigationHealth health;
 };
 
 /// Plays the whole log in the order of its stamps. Every frame is answered causally, as in flight.
@@ -56,8 +54,8 @@ struct CameraTrajectory {
   std::vector<bool> direction_valid;     ///< of each motion
   std::size_t frames_left = 0;           ///< with an answer, but not in the longest unbroken chain
   std::optional<GeodeticOrigin> origin;  ///< of the world, where the GNSS log has one
-  navigation::Health health;
-  std::vector<Hint> hints;  ///< of log and run, worst first; filled by who knows the log
+  NavigationHealth health;               ///< of the run
+  std::vector<Hint> hints;               ///< of log and run, worst first; filled by who knows the log
 };
 
 /// The longest unbroken chain of a run's motions as poses of the camera. The first pose is the filter's own;

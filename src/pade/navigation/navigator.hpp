@@ -11,6 +11,7 @@
 #include <memory>
 #include <string_view>
 
+#include "pade/core/health.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
@@ -68,33 +69,6 @@ struct NavigatorOptions {
 
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const NavigatorOptions& options);
-
-/// How far the filter can be relied on.
-enum class NavigationStatus : std::uint8_t {
-  uninitialised,   ///< nothing is known yet
-  levelled,        ///< attitude, and yaw with a standard deviation over 0.125 rad or not at all
-  yaw_known,       ///< no GNSS velocity has confirmed it yet
-  navigating,      ///< all is well
-  dead_reckoning,  ///< no GNSS velocity for a while, or none that the positions do not contradict
-  lost,            ///< the measurements refute the covariance: nothing here is to be relied on
-};
-
-/// How the filter is, and counts since its construction.
-struct Health {
-  NavigationStatus status = NavigationStatus::uninitialised;  ///< now
-  double seconds_since_velocity = 0;                          ///< since one passed its gate
-  double seconds_since_position = 0;                          ///< the same of GNSS positions
-  double yaw_sigma = 0;                                       ///< rad
-  std::uint64_t imu_refused = 0;         ///< not finite, or not later than the one before
-  std::uint64_t imu_gaps = 0;            ///< pairs of samples farther apart than FilterOptions::gap
-  std::uint64_t too_late = 0;            ///< measurements older than the history
-  std::uint64_t duplicates = 0;          ///< same sensor, same stamp
-  std::uint64_t unusable = 0;            ///< not finite
-  std::uint64_t restarts = 0;            ///< after a gap too long to bridge, or when lost for too long
-  std::uint64_t restarts_when_lost = 0;  ///< of them, those of the second kind
-  std::uint64_t times_lost = 0;          ///< times that the status became `lost`
-  std::uint64_t velocity_doubted = 0;    ///< times that the GNSS velocities contradicted the positions
-};
 
 /// The answer to a question that cannot always be answered.
 enum class Answer : std::uint8_t {
@@ -174,16 +148,3 @@ class Navigator {
 };
 
 }  // namespace pade::navigation
-
-template <>
-struct pade::EnumNames<pade::navigation::NavigationStatus> {
-  using Status = pade::navigation::NavigationStatus;
-  static constexpr std::array names = {
-      std::pair{Status::uninitialised, std::string_view("uninitialised")},
-      std::pair{Status::levelled, std::string_view("levelled")},
-      std::pair{Status::yaw_known, std::string_view("yaw_known")},
-      std::pair{Status::navigating, std::string_view("navigating")},
-      std::pair{Status::dead_reckoning, std::string_view("dead_reckoning")},
-      std::pair{Status::lost, std::string_view("lost")},
-  };
-};

@@ -22,7 +22,7 @@ Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
 
 std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run) {
   std::vector<Hint> hints = checked.hints;
-  const auto of_run = navigation::check_run(run.sensors, run.health, checked.log.imu.size());
+  const auto of_run = navigation::check_run(run.health.sensors, run.health.filter, checked.log.imu.size());
   hints.insert(hints.end(), of_run.begin(), of_run.end());
   std::stable_sort(hints.begin(), hints.end(),
                    [](const Hint& a, const Hint& b) { return a.severity > b.severity; });
@@ -31,7 +31,7 @@ std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run)
 
 Error never_aligned(const std::string& folder, const CheckedLog& checked, const NavigationRun& run) {
   std::string text = fmt::format("{}: the filter never found its attitude and yaw (status: {})", folder,
-                                 to_name(run.health.status));
+                                 to_name(run.health.filter.status));
   const std::vector<Hint> hints = all_hints(checked, run);
   for (const Hint& hint : hints) text += fmt::format("\n  {}\n  -> {}", hint.message, hint.advice);
   if (hints.empty()) {

@@ -174,6 +174,7 @@ class Run {
     info.health.motions_without_scale = static_cast<int>(sequence_.motions_without_scale());
     info.health.skipped = sequence_.skipped();
     info.health.skipped.insert(info.health.skipped.end(), undecodable_.begin(), undecodable_.end());
+    info.health.navigation = sequence_.navigation();
     info.health.warnings = sequence_.notes();
     info.world_up = sequence_.world_up();
     info.origin = sequence_.origin();

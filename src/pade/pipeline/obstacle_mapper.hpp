@@ -17,6 +17,7 @@
 #include "pade/core/depth_image.hpp"
 #include "pade/core/flow_field.hpp"
 #include "pade/core/frame.hpp"
+#include "pade/core/health.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/result.hpp"
 #include "pade/depth/depth_estimator.hpp"
@@ -136,13 +137,6 @@ struct MapperUpdate {
   depth::DepthDiagnostics diagnostics;  ///< of the (last) pair
   mapping::MapChange change;            ///< what the depth image changed in the map
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
-};
-
-/// Counts of a flight so far.
-struct MapperHealth {
-  std::size_t frames = 0;   ///< calls of add()
-  std::size_t mapped = 0;   ///< of them, those that gave a depth image
-  std::size_t skipped = 0;  ///< of them, those that could not be used
 };
 
 /// Obstacle mapping from one camera and its poses. Not thread-safe; nothing global, no files.

@@ -85,6 +85,7 @@ io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) 
     }
     result.motions_without_scale = static_cast<std::size_t>(
         std::count(trajectory->scale_valid.begin(), trajectory->scale_valid.end(), false));
+    result.navigation = trajectory->health;
     result.notes = notes_on(*trajectory);
     return result;
   };

@@ -211,18 +211,20 @@ std::string health_table(const NavigationRun& run) {
                      to_string(m.time), m.innovation.jump);
     }
   }
-  const navigation::Health& h = run.health;
+  const navigation::Health& h = run.health.filter;
   return fmt::format(
       "<table><tr><th>health</th><th></th></tr>\n<tr><td>status at the end</td><td>{}</td></tr>\n"
       "<tr><td>frames with / without answer</td><td>{} / {}</td></tr>\n"
+      "<tr><td>speed, median / largest</td><td>{:.2f} / {:.2f} m/s</td></tr>\n"
       "<tr><td>measurements accepted / inflated / rejected / re-acquired / before the start or "
       "unusable</td><td>{} / {} / {} / {} / {}</td></tr>\n"
       "<tr><td>IMU samples refused, gaps</td><td>{}, {}</td></tr>\n"
       "<tr><td>measurements too late, repeated, not finite</td><td>{}, {}, {}</td></tr>\n"
       "<tr><td>times lost / velocities doubted / starts anew</td><td>{} / {} / {}</td></tr>\n{}</table>\n",
-      to_name(h.status), run.frames.size(), run.frames_without_answer, verdicts[0], verdicts[1], verdicts[2],
-      verdicts[3], verdicts[4], h.imu_refused, h.imu_gaps, h.too_late, h.duplicates, h.unusable, h.times_lost,
-      h.velocity_doubted, h.restarts, jumps);
+      to_name(h.status), run.frames.size(), run.health.frames_without_answer, run.health.speed_median,
+      run.health.speed_largest, verdicts[0], verdicts[1], verdicts[2], verdicts[3], verdicts[4],
+      h.imu_refused, h.imu_gaps, h.too_late, h.duplicates, h.unusable, h.times_lost, h.velocity_doubted,
+      h.restarts, jumps);
 }
 
 }  // namespace

@@ -61,7 +61,15 @@ RunInfo some_info(cv::Size size) {
   info.camera.height = size.height;
   info.camera.fx = info.camera.fy = 21.5;
   info.window = 2;
-  info.health = {5, 4, 3, 7, 8, {{"rgb/3.png", "found 0 bytes"}}, {"world_up is a guess"}};
+  info.health = {
+      5, 4, 3, 7, 8, {{"rgb/3.png", "found 0 bytes"}}, {"world_up is a guess"}, NavigationHealth{}};
+  NavigationHealth& navigation = *info.health.navigation;
+  navigation.filter.status = navigation::NavigationStatus::dead_reckoning;
+  navigation.filter.times_lost = 3;
+  navigation.frames = 40;
+  navigation.speed_median = 1.5;
+  navigation.speed_largest = 9.25;
+  navigation.sensors = {{"gnss_velocity", 100, 7, 1.25}};
   info.world_up = WorldUp{{0, -1, 0}, true, "camera.yaml"};
   info.origin = GeographicOrigin{48.1, 11.6, 519.0};
   info.map = MapSummary{0.1, 123, 4567, 9000, 800, 70, 6, 5000};
@@ -197,6 +205,15 @@ TEST(RunFolderFiles, KeepTheHintsAndWhatTheyLookAt) {
   EXPECT_EQ(info.hints, expected.hints);
   EXPECT_EQ(info.health.frames_without_pose, 7);
   EXPECT_EQ(info.health.motions_without_scale, 8);
+  ASSERT_TRUE(info.health.navigation);
+  EXPECT_EQ(info.health.navigation->filter.status, navigation::NavigationStatus::dead_reckoning);
+  EXPECT_EQ(info.health.navigation->filter.times_lost, 3U);
+  EXPECT_EQ(info.health.navigation->frames, 40U);
+  EXPECT_EQ(info.health.navigation->speed_median, 1.5);
+  EXPECT_EQ(info.health.navigation->speed_largest, 9.25);
+  ASSERT_EQ(info.health.navigation->sensors.size(), 1U);
+  EXPECT_EQ(info.health.navigation->sensors[0].refused, 7U);
+  EXPECT_EQ(info.health.navigation->sensors[0].chi_square, 1.25);
   EXPECT_EQ(info.map->depths, 9000U);
   EXPECT_EQ(info.map->depths_beyond, 800U);
   EXPECT_EQ(info.map->depths_uncertain, 70U);

@@ -35,6 +35,13 @@ const std::string kOpenCvMatrix =
 const std::string kOpenCvLens =
     "!!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.3, 0.1, 0.001, -0.002, 0. ]\n";
 
+std::string xml_matrix(const std::string& name, int rows, int columns, const std::string& data) {
+  return fmt::format(
+      "<{0} type_id=\"opencv-matrix\">\n  <rows>{1}</rows>\n  <cols>{2}</cols>\n  <dt>d</dt>\n"
+      "  <data>\n    {3}</data></{0}>\n",
+      name, rows, columns, data);
+}
+
 std::string listed(const std::vector<double>& values) {
   std::string text;
   for (const double value : values) text += fmt::format("- {}\n", value);
@@ -95,6 +102,24 @@ INSTANTIATE_TEST_SUITE_P(
         Written{"OpenCvSampleName", "OpenCV",
                 "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: " + kOpenCvMatrix +
                     "dist_coeff: " + kOpenCvLens},
+        Written{
+            "OpenCvXml", "OpenCV",
+            "<?xml version=\"1.0\"?>\n<opencv_storage>\n<calibration_Time>\"Sun Nov 29\"</calibration_Time>\n"
+            "<!-- a comment -->\n<image_width>640</image_width>\n<image_height>480</image_height>\n" +
+                xml_matrix("camera_matrix", 3, 3, "400.5 0. 320.25\n    0. 401.5 240.75 0. 0. 1.") +
+                xml_matrix("distortion_coefficients", 5, 1, "-3.0e-01 1.0e-01\n 1.0e-03 -2.0e-03 0.") +
+                "<per_view_reprojection_errors/>\n</opencv_storage>\n"},
+        Written{"OpenCvXmlOfOldTutorials", "OpenCV",
+                "<opencv_storage>\n<image_Width>640</image_Width><image_Height>480</image_Height>\n" +
+                    xml_matrix("Camera_Matrix", 3, 3, "400.5 0 320.25 0 401.5 240.75 0 0 1") +
+                    xml_matrix("Distortion_Coefficients", 5, 1, "-0.3 0.1 0.001 -0.002 0") +
+                    xml_matrix("Extrinsic_Parameters", 1, 6, "1 2 3 4 5 6") + "</opencv_storage>\n"},
+        Written{"OpenCvXmlOfAPair", "OpenCV",
+                "<?xml version=\"1.0\"?>\n<opencv_storage>\n" + xml_matrix("M1", 3, 3, "1 0 1 0 1 1 0 0 1") +
+                    xml_matrix("D1", 1, 4, "0 0 0 0") +
+                    xml_matrix("M2", 3, 3, "400.5 0 320.25 0 401.5 240.75 0 0 1") +
+                    xml_matrix("D2", 1, 4, "-0.3 0.1 0.001 -0.002") + "</opencv_storage>\n",
+                without_size(kLens), 1},
         Written{"OpenCvCamelCase", "OpenCV",
                 "%YAML:1.0\n---\ncameraMatrix: " + kOpenCvMatrix + "distCoeffs: " + kOpenCvLens,
                 without_size(kLens)},
@@ -212,8 +237,21 @@ INSTANTIATE_TEST_SUITE_P(
                 "field model_type: found \"MEI\""},
         Refused{"ColmapFov", "1 FOV 640 480 1 1 1 1 1\n", "found camera model \"FOV\""},
         Refused{"NoSuchColmapCamera", "1 PINHOLE 640 480 1 1 1 1\n", "found 1 cameras", 3},
-        Refused{"Xml", "<?xml version=\"1.0\"?>\n<opencv_storage></opencv_storage>\n",
-                "found XML, expected YAML"},
+        Refused{"EmptyXml", "<?xml version=\"1.0\"?>\n<opencv_storage></opencv_storage>\n", "without fields"},
+        Refused{"OtherXml", "<?xml version=\"1.0\"?>\n<calibration><f>3000</f></calibration>\n",
+                "line 2: found XML of <calibration>, expected <opencv_storage>"},
+        Refused{"XmlCutShort", "<opencv_storage>\n<camera_matrix><rows>3</rows>\n",
+                "line 3: found the end of the file"},
+        Refused{"XmlFieldTwice", "<opencv_storage>\n<a>1</a>\n<a>2</a></opencv_storage>\n",
+                "line 3: field a appears twice"},
+        Refused{"XmlLensOfAnotherName",
+                "<opencv_storage>\n" + xml_matrix("Intrinsics", 3, 3, "400 0 320 0 400 240 0 0 1") +
+                    "</opencv_storage>\n",
+                "line 2: field Intrinsics: looks like a lens"},
+        Refused{"XmlMatrixOfWords",
+                "<opencv_storage>\n" + xml_matrix("camera_matrix", 3, 3, "a b c d e f g h i") +
+                    "</opencv_storage>\n",
+                "line 2: field camera_matrix"},
         Refused{"ThinPrism",
                 "image_width: 640\nimage_height: 480\ncamera_matrix:\n  data: [1, 0, 1, 0, 1, 1, 0, 0, "
                 "1]\ndistortion_model: rational_polynomial\ndistortion_coefficients:\n  data: [1, 1, 1, 1, "

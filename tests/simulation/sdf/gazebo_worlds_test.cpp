@@ -33,6 +33,7 @@ struct Probe {
   double y, z;
   double distance;
   Vector3d srgb = Vector3d::Constant(kAnyColour);
+  const char* visual = nullptr;  ///< part of the name of what is hit; null = any
 };
 
 struct Case {
@@ -154,6 +155,14 @@ std::string model_file(const std::string& name, const std::string& inside) {
 }
 std::string include(const std::string& name, const std::string& more = "") {
   return "<include><uri>model://" + name + "</uri>" + more + "</include>";
+}
+
+/// A square polyline around (0, y), half a side wide in both directions.
+std::string square(double half, double height, double y = 0) {
+  return fmt::format(
+      "<polyline><point>{0} {1}</point><point>{2} {1}</point><point>{2} {3}</point><point>{0} {3}"
+      "</point><height>{4}</height></polyline>",
+      -half, y - half, half, y + half, height);
 }
 
 const Vector3d kBrown(0.7, 0.5, 0.3);
@@ -292,6 +301,49 @@ std::vector<Case> cases() {
                     "1</point><point>-1 0.5</point><point>0 0.5</point><point>0 -0.5</point><point>-1 "
                     "-0.5</point><height>1</height></polyline></geometry>")),
        {{0, 0.5, 8}, {0.8, 0.5, 7}, {-0.8, 0.5, 7}}},
+      {"PolylineWithAHole",
+       model(visual("<geometry>" + square(1, 1) + square(0.5, 1) + "</geometry>")),
+       {{0, 0.5, 7}, {0.75, 0.5, 7}, {1.1, 0.5, kNothing}}},
+      {"PolylineRingSeenThroughItsGap",
+       model(visual("<pose>0 0 1 0 1.5707963267948966 0</pose><geometry>" + square(1, 0.5) +
+                    square(0.5, 0.5) + "</geometry>")),
+       {{0, 1, kNothing}, {0.75, 1, 8}, {0, 1.75, 8}, {0, 2.1, kNothing}}},
+      {"PolylineInAHoleOfAnother",
+       model(visual("<pose>0 0 1 0 1.5707963267948966 0</pose><geometry>" + square(1, 0.5) +
+                    square(0.6, 0.5) + square(0.3, 0.5) + "</geometry>")),
+       {{0, 1, 8}, {0.45, 1, kNothing}, {0.8, 1, 8}}},
+      {"PolylinesBesideEachOther",
+       model(visual("<geometry>" + square(0.5, 1) + square(0.5, 1, 3) + "</geometry>")),
+       {{0, 0.5, 7.5}, {1.5, 0.5, kNothing}, {3, 0.5, 7.5}}},
+      {"PolylinesOfTwoHeights",
+       model(visual("<geometry>" + square(0.5, 1) + square(0.5, 2, 3) + "</geometry>")),
+       {{3, 0.5, 7.5}, {3, 1.5, kNothing}},
+       {},
+       "one height, 1 m of the first"},
+      {"StateMovesALink",
+       "<model name='m'><static>true</static><link name='l'>" +
+           box(diffuse("0 1 0"), "0 0 1 0 0 0", "green") + "</link><link name='k'>" +
+           box(diffuse("1 0 0"), "0 0 1 0 0 0", "red") +
+           "</link></model><state world_name='w'><model name='m'><link name='k'><pose>0 2 0 0 0 "
+           "0</pose></link>"
+           "</model></state>",
+       {{0, 1, 7.5, {0, 1, 0}, "green"}, {2, 1, 7.5, {1, 0, 0}, "red"}}},
+      {"TheNearerHidesTheFarther",
+       model(box(diffuse("0 0 1"), "-2 0 1 0 0 0", "near") + box(diffuse("1 1 0"), "2 0.8 1 0 0 0", "far")),
+       {{0, 1, 5.5, {0, 0, 1}, "near"}, {0.45, 1, 5.5, {0, 0, 1}, "near"}, {0.55, 1, 9.5, {1, 1, 0}, "far"}}},
+      {"IncludedTwiceUnderTwoNames",
+       include("b", "<name>left</name><pose>0 2 0 0 0 0</pose>") +
+           include("b", "<name>right</name><pose>0 -2 0 0 0 0</pose>"),
+       {{2, 1, 7.5, kBrown, "left"}, {-2, 1, 7.5, kBrown, "right"}, {0, 1, kNothing}},
+       {{"models/b/model.sdf", model_file("b", kBrownBox)}}},
+      {"NothingThatIsNotSeenRefuses",
+       "<physics type='ode'><max_step_size>-1</max_step_size></physics><gui><camera name='g'/></gui>"
+       "<model name='m'><link name='l'><self_collide>true</self_collide>" +
+           box() +
+           "</link><joint name='j' type='revolute'><parent>l</parent><child>ghost</child></joint></model>",
+       {{0, 1, 7.5}},
+       {},
+       "ghost"},
       {"TwoVisualsOfOneName",
        model(box("", "0 0 1 0 0 0") + box("", "0 2 1 0 0 0")),
        {{0, 1, 7.5}, {2, 1, 7.5}},
@@ -364,16 +416,55 @@ TEST_P(GazeboWorlds, AreDrawnAsGazeboShowsThem) {
       continue;
     }
     EXPECT_NEAR(distance, probe.distance, 1e-5) << "at y " << probe.y << ", z " << probe.z;
-    if (std::isnan(distance) || probe.srgb.x() == kAnyColour) continue;
+    if (std::isnan(distance)) continue;
     RayPacket rays;
     rays.set(0, origin, Vector3d::UnitX(), 0, 100);
     const HitPacket hit = scene->nearest(rays);
     const auto seen =
         scene->surface(hit.primitive[0], origin + distance * Vector3d::UnitX(), Vector3d::UnitX(), false);
-    const Material& material = scene->world().visuals[static_cast<std::size_t>(seen.visual)].material;
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(material.colour[i], linear_from_srgb(probe.srgb[i]), 2e-3) << i;
+    const Visual& visual = scene->world().visuals[static_cast<std::size_t>(seen.visual)];
+    if (probe.visual != nullptr) {
+      EXPECT_THAT(visual.name, HasSubstr(probe.visual));
+    }
+    if (probe.srgb.x() == kAnyColour) continue;
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(visual.material.colour[i], linear_from_srgb(probe.srgb[i]), 2e-3) << i;
+    }
   }
 }
+
+/// Models in a folder that only a variable of the environment, or the caller, names.
+class GazeboPaths : public testing::TestWithParam<const char*> {};
+
+TEST_P(GazeboPaths, AreLookedThroughAlsoInsideIncludedModels) {
+  const std::filesystem::path root =
+      std::filesystem::temp_directory_path() / fmt::format("pade_paths_{}_{}", ::getpid(), GetParam());
+  for (const char* name : {"worlds", "elsewhere/a", "elsewhere/b"})
+    std::filesystem::create_directories(root / name);
+  std::ofstream(root / "elsewhere/a/model.sdf") << model_file("a", include("b"));
+  std::ofstream(root / "elsewhere/b/model.sdf") << model_file("b", kBrownBox);
+  const std::filesystem::path file = root / "worlds" / "w.world";
+  std::ofstream(file) << "<?xml version='1.0'?><sdf version='1.6'><world name='w'>" << kSun << include("a")
+                      << "</world></sdf>";
+  EXPECT_FALSE(read_sdf(file).ok()) << "nobody says where they are";
+  ResourcePaths resources;
+  const std::string elsewhere = (root / "elsewhere").string();
+  const bool variable = std::string(GetParam()) != "resources";
+  if (variable) ::setenv(GetParam(), ("/nowhere:" + elsewhere).c_str(), 1);
+  if (!variable) resources = {elsewhere};
+  const auto world = read_sdf(file, resources);
+  if (variable) ::unsetenv(GetParam());
+  std::filesystem::remove_all(root);
+  ASSERT_TRUE(world.ok()) << world.error().message;
+  ASSERT_EQ(world->visuals.size(), 1U);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(world->visuals[0].material.colour[i], linear_from_srgb(kBrown[i]), 2e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, GazeboPaths,
+                         testing::Values("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH",
+                                         "GAZEBO_MODEL_PATH", "resources"),
+                         [](const auto& instance) { return std::string(instance.param); });
 
 INSTANTIATE_TEST_SUITE_P(Of, GazeboWorlds, testing::ValuesIn(cases()),
                          [](const auto& instance) { return std::string(instance.param.name); });

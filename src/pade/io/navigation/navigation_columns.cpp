@@ -24,7 +24,11 @@ std::optional<BodyFrame> stated_body_frame(const std::string& comment) {
 }
 
 Error no_frame(const NumericTable& table, std::string_view expected) {
-  return Error{fmt::format("{}: no frame given, expected a line '# frame={}'", table.name, expected)};
+  return Error{fmt::format(
+      "{}: no frame given, expected a line '# frame={}' at its top{}", table.name, expected,
+      expected.starts_with("FLU") ? " (FLU: x forward, y left, z up; FRD: x forward, y right, z down; "
+                                    "at rest the specific force along z is +9.8 in FLU, -9.8 in FRD)"
+                                  : "")};
 }
 
 std::optional<Vector3d> three_after(const std::string& comment, std::string_view keyword) {

@@ -86,6 +86,8 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
     auto gnss = parse_gnss(*text, gnss_path->string(), options.gnss_defaults, log.remarks);
     if (!gnss) return gnss.error();
     log.gnss = std::move(*gnss);
+  } else {
+    log.remarks.push_back(fmt::format("{}: no GNSS log found, expected gnss.csv", folder.string()));
   }
   auto barometer = read_optional(folder / "baro.csv", parse_barometer, log.remarks);
   if (!barometer) return barometer.error();

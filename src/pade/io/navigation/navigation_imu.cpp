@@ -147,14 +147,18 @@ Status check_units(const std::vector<ImuSample>& samples, std::string_view name)
   };
   const double median_force = median(force);
   if (median_force > 0.7 && median_force < 1.4) {
-    return Error{fmt::format(
-        "{}: the specific force is {:.2f} (median norm), expected about {:.2f} m/s²: this is in g", name,
-        median_force, kStandardGravity)};
+    return Error{
+        fmt::format("{}: the specific force is {:.2f} (median norm), expected about {:.2f} m/s²: this is in "
+                    "g; convert it, or "
+                    "write the unit into the heading (ax [g])",
+                    name, median_force, kStandardGravity)};
   }
   if (median_force > 700 && median_force < 1400) {
-    return Error{fmt::format(
-        "{}: the specific force is {:.0f} (median norm), expected about {:.2f} m/s²: this is in mg", name,
-        median_force, kStandardGravity)};
+    return Error{
+        fmt::format("{}: the specific force is {:.0f} (median norm), expected about {:.2f} m/s²: this is in "
+                    "mg; convert it, or "
+                    "write the unit into the heading (ax [mg])",
+                    name, median_force, kStandardGravity)};
   }
   if (median_force < 3 || median_force > 40) {
     return Error{
@@ -165,7 +169,8 @@ Status check_units(const std::vector<ImuSample>& samples, std::string_view name)
   const double median_rate = median(rate);
   if (median_rate > 15) {
     return Error{fmt::format(
-        "{}: the angular rate is {:.1f} (median norm), which no vehicle keeps up in rad/s: this is in deg/s",
+        "{}: the angular rate is {:.1f} (median norm), which no vehicle keeps up in rad/s: this is in deg/s; "
+        "convert it, or write the unit into the heading (gx [deg/s])",
         name, median_rate)};
   }
   return {};

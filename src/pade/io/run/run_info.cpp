@@ -9,10 +9,14 @@
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
 
+#include "pade/io/run/health_json.hpp"
+#include "pade/io/run/run_fields.hpp"
+
 namespace pade::io {
 namespace {
 
 using Json = nlohmann::ordered_json;
+using Fields = RunFields;
 
 constexpr std::string_view kRunFormat = "pade run 2";
 constexpr double kUnlimitedScale = 500;
@@ -20,19 +24,6 @@ constexpr double kUnlimitedScale = 500;
 Json json_of(const Camera& camera) {
   return {{"width", camera.width}, {"height", camera.height}, {"fx", camera.fx},
           {"fy", camera.fy},       {"cx", camera.cx},         {"cy", camera.cy}};
-}
-
-Json json_of(const RunHealth& health) {
-  Json skipped = Json::array();
-  for (const Skipped& item : health.skipped)
-    skipped.push_back({{"file", item.file}, {"reason", item.reason}});
-  return {{"frames", health.frames},
-          {"frames_used", health.frames_used},
-          {"depth_images", health.depth_images},
-          {"frames_without_pose", health.frames_without_pose},
-          {"motions_without_scale", health.motions_without_scale},
-          {"skipped", std::move(skipped)},
-          {"warnings", health.warnings}};
 }
 
 Json json_of(const MapSummary& map) {
@@ -77,95 +68,6 @@ Json json_of_states(const std::array<std::uint64_t, depth_state_names.size()>& p
   return states;
 }
 
-// Reads fields of an object and remembers the first thing that is wrong, so that a reader stays one line per
-// field.
-class Fields {
- public:
-  Fields(const Json& json, std::string path, std::string_view file, std::optional<Error>& error)
-      : json_(json), path_(std::move(path)), file_(file), error_(error) {
-    if (!json.is_object()) fail(path_.empty() ? "the file" : path_, json, "an object");
-  }
-
-  template <class Value>
-  void read(std::string_view name, Value& value, std::string_view expected) {
-    const Json* const found = find(name, expected);
-    if (found == nullptr) return;
-    if (!fits<Value>(*found)) return fail(path_ + std::string(name), *found, expected);
-    if constexpr (NamedEnum<Value>) {
-      value = *from_name<Value>(found->template get<std::string>());
-    } else {
-      value = found->template get<Value>();
-    }
-  }
-
-  [[nodiscard]] Fields object(std::string_view name) {
-    static const Json none = Json::object();
-    const Json* const found = find(name, "an object");
-    return {found == nullptr ? none : *found, path_ + std::string(name) + ".", file_, error_};
-  }
-
-  [[nodiscard]] std::vector<Fields> list(std::string_view name) {
-    std::vector<Fields> items;
-    const Json* const found = find(name, "a list");
-    if (found != nullptr && !found->is_array()) fail(path_ + std::string(name), *found, "a list");
-    if (found == nullptr || !found->is_array()) return items;
-    for (std::size_t i = 0; i < found->size(); ++i) {
-      items.emplace_back((*found)[i], fmt::format("{}{}[{}].", path_, name, i), file_, error_);
-    }
-    return items;
-  }
-
-  [[nodiscard]] bool has(std::string_view name) const {
-    return json_.is_object() && json_.contains(name) && !json_.at(std::string(name)).is_null();
-  }
-
- private:
-  template <class Value>
-  static bool fits(const Json& json) {
-    if constexpr (std::is_same_v<Value, std::string>) return json.is_string();
-    if constexpr (NamedEnum<Value>) {
-      return json.is_string() && from_name<Value>(json.get<std::string>()).has_value();
-    }
-    if constexpr (std::is_same_v<Value, double>) return json.is_number();
-    if constexpr (std::is_same_v<Value, std::uint64_t>) return json.is_number_unsigned();
-    if constexpr (std::is_same_v<Value, int>) {
-      return json.is_number_integer() &&
-             std::abs(json.get<std::int64_t>()) <= std::numeric_limits<int>::max();
-    }
-    if constexpr (std::is_same_v<Value, std::vector<std::string>>) {
-      return json.is_array() &&
-             std::all_of(json.begin(), json.end(), [](const Json& item) { return item.is_string(); });
-    }
-    if constexpr (std::is_same_v<Value, bool>) return json.is_boolean();
-    if constexpr (std::is_same_v<Value, std::vector<double>>) {
-      return json.size() == 3 &&
-             std::all_of(json.begin(), json.end(), [](const Json& item) { return item.is_number(); });
-    }
-    if constexpr (std::is_same_v<Value, Json>) return json.is_object();
-    return false;
-  }
-
-  const Json* find(std::string_view name, std::string_view expected) {
-    if (error_ || !json_.is_object()) return nullptr;
-    const auto found = json_.find(std::string(name));
-    if (found != json_.end()) return &*found;
-    error_ = Error{fmt::format("{}: {}{}: found no such field, expected {}", file_, path_, name, expected)};
-    return nullptr;
-  }
-
-  void fail(const std::string& where, const Json& found, std::string_view expected) {
-    if (error_) return;
-    std::string text = found.dump(-1, ' ', false, Json::error_handler_t::replace);
-    if (text.size() > 40) text = text.substr(0, 37) + "...";
-    error_ = Error{fmt::format("{}: {}: found {}, expected {}", file_, where, text, expected)};
-  }
-
-  const Json& json_;
-  std::string path_;
-  std::string_view file_;
-  std::optional<Error>& error_;
-};
-
 void read_camera(Fields fields, Camera& camera) {
   fields.read("width", camera.width, "pixels");
   fields.read("height", camera.height, "pixels");
@@ -173,21 +75,6 @@ void read_camera(Fields fields, Camera& camera) {
   fields.read("fy", camera.fy, "pixels");
   fields.read("cx", camera.cx, "pixels");
   fields.read("cy", camera.cy, "pixels");
-}
-
-void read_health(Fields fields, RunHealth& health) {
-  fields.read("frames", health.frames, "a whole number");
-  fields.read("frames_used", health.frames_used, "a whole number");
-  fields.read("depth_images", health.depth_images, "a whole number");
-  fields.read("frames_without_pose", health.frames_without_pose, "a whole number");
-  fields.read("motions_without_scale", health.motions_without_scale, "a whole number");
-  fields.read("warnings", health.warnings, "a list of sentences");
-  for (Fields item : fields.list("skipped")) {
-    Skipped skipped;
-    item.read("file", skipped.file, "text");
-    item.read("reason", skipped.reason, "text");
-    health.skipped.push_back(std::move(skipped));
-  }
 }
 
 void read_map(Fields fields, MapSummary& map) {

@@ -12,23 +12,12 @@
 
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
+#include "pade/core/health.hpp"
 #include "pade/core/hint.hpp"
 #include "pade/core/result.hpp"
-#include "pade/io/skipped.hpp"
 #include "pade/io/world.hpp"
 
 namespace pade::io {
-
-/// How much of the input was usable.
-struct RunHealth {
-  int frames = 0;                     ///< images of the sequence
-  int frames_used = 0;                ///< images that had a pose and could be decoded
-  int depth_images = 0;               ///< pairs of frames that gave a depth image
-  int frames_without_pose = 0;        ///< images left out because no pose is near in time
-  int motions_without_scale = 0;      ///< motions between frames that are too short for what is known of them
-  std::vector<Skipped> skipped;       ///< in the order of the sequence
-  std::vector<std::string> warnings;  ///< what a user should know, one sentence each
-};
 
 /// What the occupancy map holds, and what it was given.
 struct MapSummary {

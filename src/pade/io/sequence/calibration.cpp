@@ -123,6 +123,12 @@ std::string without_opencv_directive(std::string_view text) {
   return out;
 }
 
+Result<Yaml> parse_tree(std::string_view text, const std::string& file) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first != std::string_view::npos && text[first] == '<') return dialect::parse_opencv_xml(text, file);
+  return parse_yaml(text.starts_with("%YAML:") ? without_opencv_directive(text) : std::string(text), file);
+}
+
 }  // namespace
 
 std::string_view lens_name(Distortion model) {
@@ -141,12 +147,8 @@ std::string_view lens_name(Distortion model) {
 
 Result<Calibration> parse_calibration(std::string_view text, const std::string& file, int camera) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  if (text.starts_with("<?xml") || text.starts_with("<opencv_storage")) {
-    return Error{fmt::format("{}: found XML, expected YAML: save the calibration as .yml", file)};
-  }
   if (auto read = dialect::read_text_dialect(text, file, camera)) return std::move(*read);
-  const bool opencv_header = text.starts_with("%YAML:");
-  const auto root = parse_yaml(opencv_header ? without_opencv_directive(text) : std::string(text), file);
+  const auto root = parse_tree(text, file);
   if (!root) return root.error();
   if (root->kind != Yaml::Kind::map) {
     return Error{

@@ -46,11 +46,11 @@ struct Calibration {
 std::string_view lens_name(Distortion model);
 
 /// Reads a calibration and recognises its dialect by what it says (docs/formats.md): our camera.yaml, a
-/// Kalibr camchain, ROS camera_info, OpenCV FileStorage YAML, EuRoC sensor.yaml, the settings of ORB-SLAM and
-/// VINS, KITTI's calib.txt and calib_cam_to_cam.txt, COLMAP's cameras.txt. Every field that is used is
-/// checked; the error names file, line, field, what was found and what was expected. Fields that look like a
-/// lens, a camera model or a mounting and are not understood are refused, never left out. `camera` chooses
-/// where a file holds several, from 0.
+/// Kalibr camchain, ROS camera_info, OpenCV FileStorage (YAML or XML), EuRoC sensor.yaml, the settings of
+/// ORB-SLAM and VINS, KITTI's calib.txt and calib_cam_to_cam.txt, COLMAP's cameras.txt. Every field that is
+/// used is checked; the error names file, line, field, what was found and what was expected. Fields that look
+/// like a lens, a camera model or a mounting and are not understood are refused, never left out. `camera`
+/// chooses where a file holds several, from 0.
 Result<Calibration> read_calibration(const std::filesystem::path& file, int camera = 0);
 /// The same from text; `file` is the name in messages.
 Result<Calibration> parse_calibration(std::string_view text, const std::string& file, int camera = 0);

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "pade/core/option_check.hpp"
+#include "pade/io/sequence/depth_file.hpp"
 #include "pade/io/sequence/frame_mask.hpp"
 #include "pade/io/sequence/image_file.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
@@ -86,8 +87,8 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, Sequ
   for (const auto& [source, info] : images) {
     const std::string file = source.file.string();
     if (info.size != camera.size()) {
-      report.skip(file, fmt::format("the image has {} pixels, expected {}", size_text(info.size),
-                                    size_text(camera.size())));
+      report.skip(file, fmt::format("the image has {} pixels, expected {} as the calibration states",
+                                    size_text(info.size), size_text(camera.size())));
       continue;
     }
     if (info.bits != bits) {
@@ -124,6 +125,7 @@ Status compute_poses(const PoseSource& source, const fs::path& folder, const std
   listing.trajectory = Trajectory(std::move(computed->poses));
   listing.computed = true;
   listing.motions_without_scale = computed->motions_without_scale;
+  listing.navigation = std::move(computed->navigation);
   report.notes.insert(report.notes.end(), computed->notes.begin(), computed->notes.end());
   return {};
 }
@@ -197,7 +199,9 @@ std::optional<GeographicOrigin> gnss_origin(const fs::path& folder) {
 
 std::string first_reason(const ReadReport& report) {
   if (report.skipped.empty()) return {};
-  return fmt::format("; first: {}: {}", report.skipped[0].file, report.skipped[0].reason);
+  const auto& [file, reason] = report.skipped[0];
+  return reason.starts_with(file + ": ") ? fmt::format("; first: {}", reason)
+                                         : fmt::format("; first: {}: {}", file, reason);
 }
 
 /// The rule of docs/sequences.md for frames that cannot be used.
@@ -271,8 +275,10 @@ struct Sequence::Data {
 /// Camera and frames.
 Status Sequence::Data::choose_frames(const PoseSource& source) {
   if (listing.images.empty()) {
-    return Error{fmt::format("{}: no images found in the layout {}{}", folder.string(), listing.layout,
-                             first_reason(report))};
+    return Error{fmt::format(
+        "{}: no images found in the layout {}, expected PNG, JPEG, PGM, PPM, PNM, BMP, TIFF or WebP "
+        "(docs/sequences.md){}",
+        folder.string(), listing.layout, first_reason(report))};
   }
   const Calibration& calibration = listing.calibration;
   if (!calibration.camera) {
@@ -432,13 +438,11 @@ Result<cv::Mat> Sequence::truth(std::size_t i) const {
     return Error{
         fmt::format("{}: no depth image within {:g} s", entry.image.string(), options().largest_truth_gap)};
   }
-  const auto raw = read_image(entry.depth);
+  const auto raw = read_depth_file(entry.depth);
   if (!raw) return raw.error();
-  if (raw->size() != data_->raw_camera.size() || raw->channels() != 1 || raw->depth() == CV_8U) {
-    return Error{fmt::format(
-        "{}: the depth image has {} pixels, {} channels of {} bits, expected {}, one channel of 16",
-        entry.depth.string(), size_text(raw->size()), raw->channels(), 8 * raw->elemSize1(),
-        size_text(data_->raw_camera.size()))};
+  if (raw->size() != data_->raw_camera.size()) {
+    return Error{fmt::format("{}: the depth image has {} pixels, expected {}", entry.depth.string(),
+                             size_text(raw->size()), size_text(data_->raw_camera.size()))};
   }
   cv::Mat depth;
   raw->convertTo(depth, CV_32F);
@@ -473,6 +477,7 @@ const Trajectory& Sequence::trajectory() const { return data_->listing.trajector
 std::size_t Sequence::listed_frames() const { return data_->listing.images.size(); }
 std::size_t Sequence::frames_without_pose() const { return data_->listing.frames_without_pose; }
 std::size_t Sequence::motions_without_scale() const { return data_->listing.motions_without_scale; }
+const std::optional<NavigationHealth>& Sequence::navigation() const { return data_->listing.navigation; }
 const std::vector<Skipped>& Sequence::skipped() const { return data_->report.skipped; }
 const std::vector<std::string>& Sequence::notes() const { return data_->report.notes; }
 

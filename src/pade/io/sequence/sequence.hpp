@@ -15,6 +15,7 @@
 
 #include "pade/core/camera.hpp"
 #include "pade/core/frame.hpp"
+#include "pade/core/health.hpp"
 #include "pade/core/result.hpp"
 #include "pade/io/sequence/calibration.hpp"
 #include "pade/io/sequence/intensity.hpp"
@@ -60,9 +61,10 @@ Status check(const SequenceOptions& options);
 
 /// Poses that are computed instead of read.
 struct ComputedPoses {
-  std::vector<StampedPose> poses;         ///< T_world_camera at the times of the images that have a pose
-  std::vector<Matrix6d> covariances;      ///< Frame::motion_covariance of each
-  std::size_t motions_without_scale = 0;  ///< too short for what is known of them
+  std::vector<StampedPose> poses;              ///< T_world_camera at the times of the images that have a pose
+  std::vector<Matrix6d> covariances;           ///< Frame::motion_covariance of each
+  std::size_t motions_without_scale = 0;       ///< too short for what is known of them
+  std::optional<NavigationHealth> navigation;  ///< of the filter that they come from
   std::vector<std::string> notes;
 };
 /// Computes them from the times of the images, in order, and the calibration as stated.
@@ -116,7 +118,8 @@ class Sequence {
   [[nodiscard]] const cv::Mat& mask() const;
 
   [[nodiscard]] const std::filesystem::path& folder() const;
-  [[nodiscard]] const std::string& layout() const;  ///< "TUM RGB-D", "EuRoC" or "KITTI odometry"
+  [[nodiscard]] const std::string& layout()
+      const;  ///< "TUM RGB-D", "EuRoC", "KITTI odometry", "TartanAir" or "ICL-NUIM"
   [[nodiscard]] const std::filesystem::path& pose_file() const;
   [[nodiscard]] const SequenceOptions& options() const;
   [[nodiscard]] const IntensityScaling& intensity() const;
@@ -137,6 +140,7 @@ class Sequence {
   [[nodiscard]] std::size_t listed_frames() const;          ///< in the folder, usable or not
   [[nodiscard]] std::size_t frames_without_pose() const;    ///< skipped because no pose is near in time
   [[nodiscard]] std::size_t motions_without_scale() const;  ///< of computed poses (ComputedPoses)
+  [[nodiscard]] const std::optional<NavigationHealth>& navigation() const;  ///< of computed poses
   [[nodiscard]] const std::vector<Skipped>& skipped() const;
   [[nodiscard]] const std::vector<std::string>& notes() const;  ///< used, but worth knowing
 

@@ -95,7 +95,7 @@ Result<Trajectory> TrajectoryBuilder::finish(ReadReport& report) {
         bad_.empty() ? "it is empty" : fmt::format("first: line {}: {}", bad_[0].first, bad_[0].second);
     return Error{
         fmt::format("{}: no usable pose in {} rows ({}), expected rows of time, position and unit "
-                    "quaternion",
+                    "quaternion (time tx ty tz qx qy qz qw; other dialects: docs/formats.md)",
                     file_, bad_.size(), why)};
   }
   for (const auto& [line, reason] : bad_) report.skip(file_, fmt::format("line {}: {}", line, reason));

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "pade/navigation/plausibility/force_match.hpp"
+#include "pade/navigation/plausibility/position_lag.hpp"
 
 namespace pade::navigation {
 namespace {
@@ -123,6 +124,7 @@ void check_upright(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) 
 void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
   constexpr double kStep = 2;  // s
   double path = 0, along = 0, along_swapped = 0, moved2 = 0, flown2 = 0, noise2 = 0, farthest = 0;
+  double level_moved2 = 0, level_flown2 = 0;  // horizontal
   std::size_t next = 0;
   const GnssFix* last = nullptr;
   Vector3d flown = Vector3d::Zero();
@@ -145,20 +147,25 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
       moved2 += moved.squaredNorm();
       flown2 += flown.squaredNorm();
       noise2 += fix.covariance.trace() + last->covariance.trace();
+      level_moved2 += moved.head<2>().squaredNorm();
+      level_flown2 += flown.head<2>().squaredNorm();
     }
     last = &fix;
     flown.setZero();
   }
   constexpr double kLeastPath = 30;  // m
-  if (path < kLeastPath || flown2 == 0) return;
+  constexpr double kDegreePerMetre = 1e-5;
+  const bool as_degrees =
+      farthest <= 360 && std::sqrt(level_moved2) < 10 * kDegreePerMetre * std::sqrt(level_flown2);
+  if ((path < kLeastPath && !as_degrees) || flown2 == 0) return;
   const double scale = along / flown2;
   const double agreement = along / std::sqrt(moved2 * flown2 + 1e-12);
-  if (std::sqrt(moved2 / flown2) < 1e-3 && farthest <= 360) {
+  if (as_degrees) {
     return add(
         hints, "gnss-degrees", HintSeverity::error,
         fmt::format("the velocities fly {:.0f} m while the positions move by {:.2g} of that: they look like "
                     "latitude and longitude",
-                    path, std::sqrt(moved2 / flown2)),
+                    path, std::sqrt(level_moved2 / level_flown2)),
         "name the columns lat, lon, alt, and they become metres around the first fix");
   }
   // What the errors of the positions explain is no contradiction.
@@ -183,11 +190,70 @@ void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
       "see which of the two is wrong: axes, unit (m/s), or the clock of one of them");
 }
 
-/// What of the readings of IMU and GNSS fits best.
-void check_readings(const NavigationLog& log, std::vector<Hint>& hints) {
-  const ForceMatch given(log, with_bias(log, {}));
+/// Which of positions and velocities a lag between them is laid upon.
+enum class Late { positions, velocities, either };
+
+std::string described(const PositionLag& apart, Late which) {
+  const double by = std::abs(apart.seconds);
+  const auto late = [](double seconds) { return seconds > 0 ? "late" : "early"; };
+  switch (which) {
+    case Late::positions:
+      return fmt::format("the GNSS positions are {:.2f} s {} against its velocities", by,
+                         late(apart.seconds));
+    case Late::velocities:
+      return fmt::format("the GNSS velocities are {:.2f} s {} against its positions", by,
+                         late(-apart.seconds));
+    case Late::either:
+      break;
+  }
+  return fmt::format(
+      "positions and velocities of the GNSS are {:.2f} s apart: the positions are {}, or the velocities {}",
+      by, late(apart.seconds), late(-apart.seconds));
+}
+
+/// By what the IMU says: `velocity_lag` in s where it has found one, else where it clearly fits better.
+Late late_one(const PositionLag& apart, const ForceMatch& imu, double velocity_lag) {
+  constexpr double kPunctual = 0.05;  // s
+  constexpr double kClearly = 0.8;    // of the misfit
+  if (velocity_lag != 0) {
+    return std::abs(velocity_lag + apart.seconds) < kPunctual ? Late::velocities : Late::positions;
+  }
+  const double as_stamped = imu.misfit();
+  const double moved = imu.misfit(-apart.seconds);
+  if (as_stamped < kClearly * moved) return Late::positions;
+  return moved < kClearly * as_stamped ? Late::velocities : Late::either;
+}
+
+/// Positions and velocities that are apart in time.
+void check_apart(const GnssLog& gnss, const ForceMatch& imu, double velocity_lag, std::vector<Hint>& hints) {
+  const auto apart = position_lag(gnss);
+  if (!apart) return;
+  const Late late = late_one(*apart, imu, velocity_lag);
+  const auto options = [](double position, double velocity) {
+    return fmt::format("--gnss-latency {:.2f} --gnss-velocity-latency {:.2f}", position, velocity);
+  };
+  const std::string of_positions = options(velocity_lag + apart->seconds, velocity_lag);
+  const std::string of_velocities = options(0, velocity_lag != 0 ? velocity_lag : -apart->seconds);
+  for (Hint& hint : hints) {
+    if (hint.id == "gnss-lag") hint.advice = "this is not the lag of the positions: see what is said of both";
+  }
+  add(hints, "gnss-apart", HintSeverity::warning,
+      fmt::format("{} (± {:.2f} s): the ways between fixes and what the velocities fly differ by {:.2f} m as "
+                  "stamped, and "
+                  "by {:.2f} m when moved by that",
+                  described(*apart, late), std::max(apart->sigma, 0.01), apart->as_stamped, apart->moved),
+      late == Late::either
+          ? fmt::format("try {}, then {}, and keep what leaves the smaller mean χ² of the positions",
+                        of_positions, of_velocities)
+          : fmt::format("give both latencies ({}), or correct the stamps",
+                        late == Late::positions ? of_positions : of_velocities));
+}
+
+/// What of the readings of IMU and GNSS fits best. Returns the seconds that the velocities are late, 0 where
+/// that is not known.
+double check_readings(const NavigationLog& log, const ForceMatch& given, std::vector<Hint>& hints) {
   const double as_given = given.misfit();
-  if (!std::isfinite(as_given)) return;
+  if (!std::isfinite(as_given)) return 0;
   constexpr double kSuspicious = 1.0;  // m/s²
   constexpr double kClearly = 0.5;
   struct Candidate {
@@ -221,22 +287,22 @@ void check_readings(const NavigationLog& log, std::vector<Hint>& hints) {
     }
   }
   if (best != nullptr) {
-    return add(
-        hints, best->id, HintSeverity::error,
+    add(hints, best->id, HintSeverity::error,
         fmt::format("IMU and GNSS contradict each other by {:.1f} m/s² as given, and by {:.2f} m/s² {}",
                     as_given, least, best->what),
         best->advice);
+    return 0;
   }
   if (const auto lag = given.lag(); lag) {
     const bool leap = std::abs(std::abs(lag->seconds) - 18) < 1 || std::abs(std::abs(lag->seconds) - 37) < 1;
-    return add(
-        hints, "gnss-lag", std::abs(lag->seconds) > 1 ? HintSeverity::error : HintSeverity::warning,
+    add(hints, "gnss-lag", std::abs(lag->seconds) > 1 ? HintSeverity::error : HintSeverity::warning,
         fmt::format(
             "the GNSS velocities are {:.2f} s {}: IMU and GNSS contradict each other by {:.2f} m/s² as "
             "stamped, and by {:.2f} m/s² when moved by that{}",
             std::abs(lag->seconds), lag->seconds > 0 ? "late" : "early", as_given, lag->misfit,
             leap ? "; this looks like the leap seconds between GPS time and UTC (18 s) or TAI (37 s)" : ""),
         fmt::format("give the latency (--gnss-latency {:.2f}), or correct the stamps", lag->seconds));
+    return lag->seconds;
   }
   constexpr double kHopeless = 3;  // m/s²
   if (as_given > kHopeless) {
@@ -247,6 +313,7 @@ void check_readings(const NavigationLog& log, std::vector<Hint>& hints) {
             as_given),
         "check the columns, axes and units of imu.csv, and that both logs are of the same flight");
   }
+  return 0;
 }
 
 }  // namespace
@@ -261,7 +328,13 @@ std::vector<Hint> check_log(const NavigationLog& log) {
   const bool clocks = std::any_of(hints.begin(), hints.end(), [](const Hint& hint) {
     return hint.severity == HintSeverity::error && (hint.id == "no-overlap" || hint.id == "stamps-go-back");
   });
-  if (!clocks) check_readings(log, hints);
+  if (clocks) return hints;
+  const ForceMatch given(log, with_bias(log, {}));
+  const double velocity_lag = check_readings(log, given, hints);
+  const bool contradicts = std::any_of(hints.begin(), hints.end(), [](const Hint& hint) {
+    return hint.severity == HintSeverity::error && hint.id != "upside-down";
+  });
+  if (!contradicts) check_apart(log.gnss, given, velocity_lag, hints);
   return hints;
 }
 

@@ -24,6 +24,7 @@ namespace pade::navigation {
 ///   gyro-axes          gyroscopes in other axes than accelerometers
 ///   gnss-axes          velocities of the GNSS in north, east, down called east, north, up
 ///   gnss-lag           velocities of the GNSS late or early, by tenths of a second or by leap seconds
+///   gnss-apart         positions and velocities of the GNSS apart in time, and which of them is late
 ///   gnss-degrees       latitude and longitude where metres are expected
 ///   gnss-contradiction positions and velocities of the GNSS do not belong together
 ///   imu-contradiction  IMU and GNSS do not belong together, and no reading above explains it
@@ -38,13 +39,7 @@ std::vector<Hint> check_log(const NavigationLog& log);
 /// The hint says what was done; empty if nothing was.
 std::optional<Hint> regularise_stamps(std::vector<ImuSample>& samples);
 
-/// What the filter made of one sensor.
-struct SensorSummary {
-  std::string sensor;            ///< "gnss_velocity", "gnss_position", "barometer", "magnetometer", "heading"
-  std::size_t measurements = 0;  ///< that reached the filter
-  std::size_t refused = 0;       ///< of them, outside the gate, or taken back only in a re-acquisition
-  double chi_square = 0;         ///< mean per degree of freedom, before the gate; 1 is consistent
-};
+/// What the filter made of each sensor (core/health.hpp).
 std::vector<SensorSummary> summarise(std::span<const Measurement> measurements);
 
 /// What the innovations of a run say:

@@ -272,23 +272,30 @@ Status Reader::add_link(const sdf::Link& link, const Pose& T_world_link, const s
 }
 
 Status Reader::add_polylines(const sdf::ElementPtr& geometry, const Visual& visual) {
-  for (sdf::ElementPtr line = geometry->GetElement("polyline"); line;
-       line = line->GetNextElement("polyline")) {
-    std::vector<Eigen::Vector2d> points;
+  const sdf::ElementPtr first = geometry->GetElement("polyline");
+  const double height = first->Get("height", 1.0).first;
+  std::vector<Polygon> polygons;
+  for (sdf::ElementPtr line = first; line; line = line->GetNextElement("polyline")) {
+    polygons.emplace_back();
     for (sdf::ElementPtr point = line->HasElement("point") ? line->GetElement("point") : nullptr; point;
          point = point->GetNextElement("point")) {
       const auto p = point->Get<ignition::math::Vector2d>();
-      points.emplace_back(p.X(), p.Y());
+      polygons.back().emplace_back(p.X(), p.Y());
     }
-    auto mesh = extrude(std::move(points), line->HasElement("height") ? line->Get<double>("height") : 1.0);
-    if (!mesh) {
-      return Error{fmt::format("{}: visual '{}': <polyline>: {}", place_of(line, file_.string()), visual.name,
-                               mesh.error().message)};
+    if (line->Get("height", 1.0).first != height) {
+      world_.warnings.push_back(
+          fmt::format("{}: visual '{}': the polylines of one geometry have one height, {:g} m of the first",
+                      place_of(line, file_.string()), visual.name, height));
     }
-    Visual piece = visual;
-    piece.shape = Mesh{std::make_shared<TriangleMesh>(std::move(*mesh)), Eigen::Vector3d::Ones()};
-    world_.visuals.push_back(std::move(piece));
   }
+  auto mesh = extrude(std::move(polygons), height);
+  if (!mesh) {
+    return Error{fmt::format("{}: visual '{}': <polyline>: {}", place_of(first, file_.string()), visual.name,
+                             mesh.error().message)};
+  }
+  Visual piece = visual;
+  piece.shape = Mesh{std::make_shared<TriangleMesh>(std::move(*mesh)), Eigen::Vector3d::Ones()};
+  world_.visuals.push_back(std::move(piece));
   return {};
 }
 

@@ -47,10 +47,11 @@ class Repair {
   explicit Repair(std::string file) : file_(std::move(file)) {}
 
   void walk(const sdf::ElementPtr& element) {
+    if (element->GetName() == "model") drop_dangling_joints(element);
     std::map<std::string, std::set<std::string>> names;  // by kind of element: siblings only
     for (const sdf::ElementPtr& child : children_of(element)) {
       const std::string& kind = child->GetName();
-      // Frames may hang on joints, so that these stay.
+      // Frames may hang on joints, so that these stay where they can.
       if (kind == "collision" || kind == "inertial" || kind == "plugin") {
         element->RemoveChild(child);
         continue;
@@ -70,6 +71,26 @@ class Repair {
     const auto text = uri->Get<std::string>();
     if (text.empty() || text == "__default__") {
       uri->Set(std::string("file://media/materials/scripts/gazebo.material"));
+    }
+  }
+
+  /// A joint to a link that is not there makes libsdformat refuse the whole world.
+  void drop_dangling_joints(const sdf::ElementPtr& model) {
+    std::set<std::string> names = {"world", "__model__"};
+    for (const sdf::ElementPtr& child : children_of(model)) {
+      if (child->HasAttribute("name")) names.insert(child->Get<std::string>("name"));
+    }
+    for (const sdf::ElementPtr& joint : children_of(model)) {
+      if (joint->GetName() != "joint") continue;
+      for (const char* end : {"parent", "child"}) {
+        const auto name = joint->HasElement(end) ? joint->GetElement(end)->Get<std::string>() : std::string();
+        if (name.find("::") != std::string::npos || names.contains(name)) continue;
+        warnings.push_back(
+            fmt::format("{}: joint '{}' has the {} '{}', which is not there: the joint is left out",
+                        place_of(joint, file_), joint->Get<std::string>("name"), end, name));
+        model->RemoveChild(joint);
+        break;
+      }
     }
   }
 

@@ -15,8 +15,8 @@
 namespace pade::simulation {
 
 /// In place: visuals, links, sensors and lights of the same name are told apart; a <script> without <uri>
-/// gets one; collisions, inertias and plugins go, since nothing of them can be seen. One sentence per kind of
-/// repair that touches what a person named.
+/// gets one; collisions, inertias, plugins and joints to links that are not there go, since nothing of them
+/// can be seen. One sentence per kind of repair that touches what a person named.
 std::vector<std::string> repair_sdf(const sdf::ElementPtr& root, const std::string& file);
 
 /// Whether an error of libsdformat concerns something that cannot be seen: joints, inertias, canonical links.

@@ -1,4 +1,4 @@
-// A polygon raised to a prism: what SDF calls a polyline.
+// Polygons raised to a prism: what SDF calls polylines.
 #pragma once
 
 #include <vector>
@@ -10,8 +10,12 @@
 
 namespace pade::simulation {
 
-/// The closed prism over a simple polygon (either way round, the last point may repeat the first), from z = 0
-/// to `height`, metres. Refused: fewer than three different points, no area, a height that is not positive.
-Result<TriangleMesh> extrude(std::vector<Eigen::Vector2d> polygon, double height);
+using Polygon = std::vector<Eigen::Vector2d>;
+
+/// The closed prism over simple polygons that do not cross (either way round, the last point may repeat the
+/// first), from z = 0 to `height`, metres. A polygon inside another is a hole, one inside a hole is solid
+/// again. Refused: a polygon of fewer than three different points or without area, a height that is not
+/// positive.
+Result<TriangleMesh> extrude(std::vector<Polygon> polygons, double height);
 
 }  // namespace pade::simulation

@@ -52,9 +52,11 @@ void read_resolution(Fields& fields, Camera& camera) {
 
 /// Kalibr and EuRoC know other projections than the pinhole.
 void require_pinhole(Fields& fields) {
-  fields.require({"camera_model"}, "pinhole");
-  const auto model = fields.text("camera_model", "pinhole");
-  if (model && *model != "pinhole") fields.wrong(*fields.find({"camera_model"}), "camera_model", "pinhole");
+  constexpr std::string_view kPinhole =
+      "pinhole: calibrate with it (and equidistant distortion where the lens is wide)";
+  fields.require({"camera_model"}, kPinhole);
+  const auto model = fields.text("camera_model", kPinhole);
+  if (model && *model != "pinhole") fields.wrong(*fields.find({"camera_model"}), "camera_model", kPinhole);
 }
 
 std::string camera_key(int camera) { return fmt::format("cam{}", camera); }
@@ -140,6 +142,13 @@ void read_matrix(Fields& fields, Camera& camera, const std::string& name) {
   const auto zero = [&](double value) { return std::abs(value) <= kRounding * std::abs(m[0]); };
   const bool good = m.size() == 9 && m[0] > 0 && m[4] > 0 && zero(m[3]) && zero(m[6]) && zero(m[7]) &&
                     std::abs(m[8] - 1) <= kRounding;
+  const bool empty = m.size() == 9 && std::all_of(m.begin(), m.end(), [](double v) { return v == 0; });
+  if (empty) {
+    return fields.fail(
+        fmt::format("line {}: field {}: found nothing but zeros, which says that the camera was never "
+                    "calibrated; expected {}",
+                    fields.find({name})->line, name, kMatrix));
+  }
   if (!good) return fields.wrong(*fields.find({name}), name, kMatrix);
   if (!zero(m[1])) {
     return fields.fail(fmt::format("line {}: field {}: found a skew of {:g}, expected {}",
@@ -281,8 +290,8 @@ Result<Calibration> read_opencv(const Yaml& root, const std::string& file, int i
   if (const auto problem = set_distortion(camera, model, coefficients)) fields.fail(*problem);
   fields.ignore({"calibration_time", "nframes", "nr_of_frames", "board_width", "board_height", "square_size",
                  "aspectRatio", "fix_aspect_ratio", "flags", "avg_reprojection_error",
-                 "per_view_reprojection_errors", "extrinsic_parameters", "image_points", "grid_points",
-                 "per_view_errors", "camera_name"});
+                 "per_view_reprojection_errors", "extrinsic_parameters", "Extrinsic_Parameters",
+                 "image_points", "grid_points", "per_view_errors", "camera_name"});
   if (pair) fields.ignore({"M1", "M2", "K1", "K2", "D1", "D2"});
   out.camera = camera;
   return finish(fields, std::move(out));

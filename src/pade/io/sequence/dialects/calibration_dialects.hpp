@@ -32,6 +32,10 @@ Result<Calibration> read_camera_info(const Yaml& root, const std::string& file);
 bool is_opencv(const Yaml& root);
 Result<Calibration> read_opencv(const Yaml& root, const std::string& file, int camera);
 
+/// The XML of OpenCV's FileStorage as the tree of its YAML. Refused: other XML, and what is malformed, nested
+/// deeper than 16, or has a field twice.
+Result<Yaml> parse_opencv_xml(std::string_view text, const std::string& file);
+
 /// The settings of ORB-SLAM 2 and 3 (Camera.fx or Camera1.fx ...; Tbc, IMU.T_b_c1).
 bool is_orb_slam(const Yaml& root);
 Result<Calibration> read_orb_slam(const Yaml& root, const std::string& file, int camera);

@@ -88,6 +88,8 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
   if (path_exists(folder / "mav0" / "cam0") || path_exists(folder / "cam0" / "data.csv")) {
     return read_euroc_layout(folder, choice, report);
   }
+  if (is_tartanair_layout(folder)) return read_tartanair_layout(folder, choice, report);
+  if (is_icl_nuim_layout(folder)) return read_icl_nuim_layout(folder, choice, report);
   for (const char* name : {"image_0", "image_1", "image_2", "image_3"}) {
     if (path_exists(folder / name)) return read_kitti_layout(folder, choice, report);
   }
@@ -96,8 +98,8 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
     if (path_exists(folder / name)) return read_tum_layout(folder, choice, report);
   }
   return Error{fmt::format(
-      "{}: no known layout, expected rgb/ or images/ (TUM RGB-D), mav0/cam0/ (EuRoC), or image_0/ or "
-      "image_2/ (KITTI odometry)",
+      "{}: no known layout, expected rgb/ or images/ (TUM RGB-D, ICL-NUIM), mav0/cam0/ (EuRoC), image_0/ or "
+      "image_2/ (KITTI odometry), or image_left/ with pose_left.txt (TartanAir)",
       folder.string())};
 }
 

@@ -1,4 +1,5 @@
-// What a folder layout (TUM RGB-D, EuRoC, KITTI odometry) delivers to Sequence: lists, not yet pixels.
+// What a folder layout (TUM RGB-D, EuRoC, KITTI odometry, TartanAir, ICL-NUIM) delivers to Sequence: lists,
+// not yet pixels.
 #pragma once
 
 #include <filesystem>
@@ -22,7 +23,7 @@ struct StampedFile {
 
 /// The lists of a sequence as found, in the order of the files.
 struct SequenceListing {
-  std::string layout;  ///< "TUM RGB-D", "EuRoC" or "KITTI odometry"
+  std::string layout;  ///< "TUM RGB-D", "EuRoC", "KITTI odometry", "TartanAir" or "ICL-NUIM"
   std::vector<StampedFile> images;
   std::vector<StampedFile> depth;  ///< truth, may be empty
   std::filesystem::path pose_file;
@@ -31,7 +32,8 @@ struct SequenceListing {
   bool computed = false;                  ///< the trajectory is of the camera, at the times of the images
   std::map<Time, Matrix6d> covariances;   ///< of computed poses: Frame::motion_covariance
   std::size_t motions_without_scale = 0;  ///< of computed poses
-  std::size_t frames_without_pose = 0;    ///< known when frames and poses have met
+  std::optional<NavigationHealth> navigation;  ///< of computed poses
+  std::size_t frames_without_pose = 0;         ///< known when frames and poses have met
   Calibration calibration;
   std::optional<WorldUp> world_up;  ///< if the layout itself prescribes it
 };
@@ -50,6 +52,13 @@ Result<SequenceListing> read_euroc_layout(const std::filesystem::path& folder, c
                                           ReadReport& report);
 Result<SequenceListing> read_kitti_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
                                           ReadReport& report);
+
+bool is_tartanair_layout(const std::filesystem::path& folder);
+Result<SequenceListing> read_tartanair_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
+                                              ReadReport& report);
+bool is_icl_nuim_layout(const std::filesystem::path& folder);
+Result<SequenceListing> read_icl_nuim_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
+                                             ReadReport& report);
 
 /// Recognises the layout and reads it.
 Result<SequenceListing> read_layout(const std::filesystem::path& folder, const LayoutChoice& choice,

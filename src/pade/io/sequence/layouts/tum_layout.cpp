@@ -54,8 +54,12 @@ std::vector<StampedFile> files_named_by_time(const fs::path& folder, ReadReport&
     if (const auto time = parse_stamp(stems[i], unit)) {
       files.push_back({*time, images[i]});
     } else {
-      report.skip(images[i].string(),
-                  fmt::format("found name {}, expected the time in seconds", in_quotes(stems[i])));
+      report.skip(
+          images[i].string(),
+          fmt::format(
+              "found name {}, expected the time in seconds, or beside the folder a list {}.txt of rows 'time "
+              "file'",
+              in_quotes(stems[i]), folder.filename().string()));
     }
   }
   std::stable_sort(files.begin(), files.end(),
@@ -167,8 +171,15 @@ Result<SequenceListing> read_tum_layout(const fs::path& folder, const LayoutChoi
   if (!calibration) return calibration.error();
   listing.calibration = std::move(*calibration);
 
-  auto images = list_images(folder, name_of_images(folder), false, report);
+  const std::string name = name_of_images(folder);
+  auto images = list_images(folder, name, false, report);
   if (!images) return images.error();
+  if (images->empty() && report.skipped.empty()) {
+    return Error{fmt::format(
+        "{}: no images found, expected PNG, JPEG, PGM, PPM, PNM, BMP, TIFF or WebP named by their time in "
+        "seconds, or listed in {}.txt",
+        (folder / name).string(), name)};
+  }
   listing.images = std::move(*images);
   const bool listed = path_exists(folder / "associations.txt");
   if (path_exists(folder / "depth") || path_exists(folder / "depth.txt") || listed) {
