@@ -54,7 +54,7 @@ TEST_P(ShippedFlights, GiveHonestMotionBetweenFramesFromTheirFirstSeconds) {
     const NavigationRun run = run_navigation(log, options);
     const auto score = score_motions(log, options, run);
     ASSERT_TRUE(score) << "seed " << seed;
-    EXPECT_EQ(run.health.times_lost, 0U) << "seed " << seed;
+    EXPECT_EQ(run.health.filter.times_lost, 0U) << "seed " << seed;
     covered.push_back(static_cast<double>(run.frames.size()) / flight->frames);
     t95.push_back(100 * score->translation_95);
     direction_95.push_back(score->direction_95 * 180 / std::numbers::pi);

@@ -159,6 +159,7 @@ void shorten_bounds(const cv::Mat& of_views, cv::Mat& bound) {
 void read_views(const ParallaxField& field, double scale, const CommonError& common,
                 const DepthOptions& depth, const ViewsDepthOptions& options, DepthImage& image) {
   const Reader reader(scale, depth, options);
+  const float kc = getenv("KC") ? (float)atof(getenv("KC")) : 1.6F;
   const auto per_scale = static_cast<float>(1 / scale);
   const auto scale2 = static_cast<float>(scale * scale);
   cv::Mat bounds(image.depth.size(), CV_32FC1, cv::Scalar(std::numeric_limits<float>::infinity()));
@@ -179,10 +180,16 @@ void read_views(const ParallaxField& field, double scale, const CommonError& com
       }
       const float sigma2 =
           reader.variance(d[u], information[u], matching[u], spread[u]) + offset[u] * offset[u];
+      const bool measured = reader.is_measured(d[u], sigma2);
+      // A vague bound is worse than that of the outline around.
+      if (!measured && !(texture[u] > kc)) {
+        Reader::drop(row, u, DepthState::no_texture);
+        continue;
+      }
       const float shared = scale2 * common(u, v, std::max(d[u], 0.0F) * per_scale);
       bound[u] = reader.bound(d[u], sigma2 + shared);
       if (!(row.bound[u] >= bound[u])) row.bound[u] = bound[u];
-      if (reader.is_measured(d[u], sigma2)) {
+      if (measured) {
         reader.place(row, u, d[u], sigma2, shared);
       } else {
         reader.refuse(row, u, sigma2);
