@@ -13,11 +13,12 @@
 namespace pade::depth {
 namespace {
 
-constexpr float kEpipoleRadius = 5;  // px: nearer to the epipole the parallax of a pair says little
-constexpr float kNearest = 0.05F;    // m
-constexpr int kBoundRadius = 2;      // px
-constexpr float kTexture = 1.6F;     // least squared slopes, in those of noise
-constexpr float kVague = 0.5F;       // px: sigma of the parallax from which on the image says nothing of it
+constexpr float kEpipoleRadius = 5;    // px: nearer to the epipole the parallax of a pair says little
+constexpr float kNearest = 0.05F;      // m
+constexpr int kBoundRadius = 2;        // px
+constexpr float kTexture = 1.6F;       // least squared slopes, in those of noise
+constexpr float kClearTexture = 2.4F;  // ... of a pixel that has a bound, but no depth
+constexpr float kVague = 0.5F;         // px: sigma of the parallax from which on the image says nothing of it
 
 constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
 
@@ -159,7 +160,6 @@ void shorten_bounds(const cv::Mat& of_views, cv::Mat& bound) {
 void read_views(const ParallaxField& field, double scale, const CommonError& common,
                 const DepthOptions& depth, const ViewsDepthOptions& options, DepthImage& image) {
   const Reader reader(scale, depth, options);
-  const float kc = getenv("KC") ? (float)atof(getenv("KC")) : 1.6F;
   const auto per_scale = static_cast<float>(1 / scale);
   const auto scale2 = static_cast<float>(scale * scale);
   cv::Mat bounds(image.depth.size(), CV_32FC1, cv::Scalar(std::numeric_limits<float>::infinity()));
@@ -182,7 +182,7 @@ void read_views(const ParallaxField& field, double scale, const CommonError& com
           reader.variance(d[u], information[u], matching[u], spread[u]) + offset[u] * offset[u];
       const bool measured = reader.is_measured(d[u], sigma2);
       // A vague bound is worse than that of the outline around.
-      if (!measured && !(texture[u] > kc)) {
+      if (!measured && !(texture[u] > kClearTexture)) {
         Reader::drop(row, u, DepthState::no_texture);
         continue;
       }
