@@ -39,7 +39,7 @@ Report some_report() {
   report.info.camera.width = size.width;
   report.info.camera.height = size.height;
   report.info.range_limit = 20;
-  report.info.health = {3, 2, 1, 0, 0, {{"rgb/2.png", "found 0 bytes"}}, {}};
+  report.info.health = {3, 2, 1, 0, 0, {{"rgb/2.png", "found 0 bytes"}}, {}, {}};
   report.info.hints = {
       {"large-mask", HintSeverity::warning, "61 % of the <image> is masked", "check mask.png"}};
   report.info.map = io::MapSummary{0.1, 3, 10};
