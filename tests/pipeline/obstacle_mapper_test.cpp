@@ -248,20 +248,22 @@ TEST(ObstacleMapper, ExactPosesAreLeftAsTheyAreToTheLastBit) {
   }
 }
 
-TEST(ObstacleMapper, ASecondLongerBaselineIsMorePrecise) {
+/// Frames to the farthest partner of the last frame of the flight, and the error of its depth.
+std::pair<int, double> last_frame(const ObstacleMapperOptions& options) {
   const ForwardFlight& f = forward();
-  const auto last = [&](const ObstacleMapperOptions& options) {
-    auto m = std::move(ObstacleMapper::create(f.scene.camera, options)).value();
-    const MapperUpdate* update = nullptr;
-    for (std::size_t k = 0; k < f.images.size(); ++k)
-      update = &m.add(f.images[k], f.scene.times[k], f.scene.T_world_camera[k]);
-    return std::pair(update->step, f.error(update->depth));
-  };
+  auto m = std::move(ObstacleMapper::create(f.scene.camera, options)).value();
+  const MapperUpdate* update = nullptr;
+  for (std::size_t k = 0; k < f.images.size(); ++k)
+    update = &m.add(f.images[k], f.scene.times[k], f.scene.T_world_camera[k]);
+  return {update->step, f.error(update->depth)};
+}
+
+TEST(ObstacleMapper, ASecondLongerBaselineIsMorePrecise) {
   ObstacleMapperOptions options;
   options.views.count = 0;
-  const auto [step, two] = last(options);
+  const auto [step, two] = last_frame(options);
   options.longest_step = 1;
-  const auto [one_step, one] = last(options);
+  const auto [one_step, one] = last_frame(options);
   EXPECT_GT(step, 1);
   EXPECT_LE(step, ObstacleMapperOptions().longest_step);
   EXPECT_EQ(one_step, 1);
@@ -269,17 +271,9 @@ TEST(ObstacleMapper, ASecondLongerBaselineIsMorePrecise) {
 }
 
 TEST(ObstacleMapper, TheFramesBeforeMakeItMorePreciseStill) {
-  const ForwardFlight& f = forward();
-  const auto last = [&](const ObstacleMapperOptions& options) {
-    auto m = std::move(ObstacleMapper::create(f.scene.camera, options)).value();
-    const MapperUpdate* update = nullptr;
-    for (std::size_t k = 0; k < f.images.size(); ++k)
-      update = &m.add(f.images[k], f.scene.times[k], f.scene.T_world_camera[k]);
-    return f.error(update->depth);
-  };
   ObstacleMapperOptions two_view;
   two_view.views.count = 0;
-  EXPECT_LT(last({}), 0.8 * last(two_view));
+  EXPECT_LT(last_frame({}).second, 0.8 * last_frame(two_view).second);
 }
 
 /// Without a baseline there are no views, and what was found before is not taken for what is seen now.

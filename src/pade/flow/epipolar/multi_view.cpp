@@ -155,7 +155,7 @@ void MultiViewEstimator::compete(const std::vector<View>& views) {
       const float* n = b.count[i].row(y);
       for (int x = 0; x < sum.cols; ++x) c[x] = n[x] > 0 ? c[x] / std::max(n[x], 1.0F) : kUnseen;
     }
-    cv::Mat smooth = header(b.count[i]);
+    cv::Mat smooth = header(b.count[i]);  // the counts have done their work: the costs go in their place
     cv::boxFilter(sum, smooth, -1, {kCostWindow, kCostWindow});
   }
   const auto share = static_cast<float>(options_.switching);
