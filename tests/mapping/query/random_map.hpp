@@ -11,10 +11,10 @@
 
 namespace pade::mapping {
 
-/// Half of the space within 10 m of the origin is free, with obstacles in it; the rest is unknown.
+/// Half of the space within 4 m of the origin is free, with obstacles in it; the rest is unknown.
 inline OccupancyMap random_map(std::uint64_t seed, double voxel = 0.1, int obstacles = 40) {
   std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> place(-10, 10);
+  std::uniform_real_distribution<double> place(-4, 4);
   std::uniform_real_distribution<double> size(0.1, 1);
   auto tree = std::make_unique<octomap::OcTree>(voxel);
   const auto ball = [&](double x, double y, double z, double radius, float log_odds) {
@@ -27,7 +27,7 @@ inline OccupancyMap random_map(std::uint64_t seed, double voxel = 0.1, int obsta
   for (int i = 0; i < 25; ++i) {
     const double x = place(random);
     const double y = place(random);
-    ball(x, y, 0.3 * place(random), 1 + 2 * size(random), i % 3 == 0 ? -2.0F : -0.4F);
+    ball(x, y, 0.3 * place(random), 0.5 + size(random), i % 3 == 0 ? -2.0F : -0.4F);
   }
   for (int i = 0; i < obstacles; ++i) {
     const double x = place(random);

@@ -18,7 +18,7 @@ namespace {
 using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
-Vector3d random_place(std::mt19937_64& random, double reach = 9) {
+Vector3d random_place(std::mt19937_64& random, double reach = 4) {
   std::uniform_real_distribution<double> along(-reach, reach);
   const double x = along(random);
   const double y = along(random);
@@ -70,11 +70,11 @@ TEST(Sweep, MeetsWhatASearchOfEveryVoxelAroundEveryPlaceMeets) {
     const OccupancyMap map = random_map(seed);
     const auto view = MapView::of(map);
     std::mt19937_64 random(seed);
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 30; ++i) {
       const UnknownSpace unknown = i % 2 == 0 ? UnknownSpace::blocked : UnknownSpace::free;
       const double radius = std::array{0.02, 0.2, 0.45}[static_cast<std::size_t>(i % 3)];
       std::vector<Vector3d> path{random_place(random)};
-      for (int k = 0; k < 2; ++k) path.push_back(path.back() + 0.3 * random_place(random));
+      for (int k = 0; k < 2; ++k) path.push_back(path.back() + 0.5 * random_place(random));
       const auto hit = view->sweep(path, radius, unknown);
       const double clear = hit ? hit->length : length_of(path);
       for (double s = 0; s < clear - 1e-9; s += kStep)
@@ -90,7 +90,7 @@ TEST(Sweep, MeetsWhatASearchOfEveryVoxelAroundEveryPlaceMeets) {
       EXPECT_NEAR((hit->place - in_segment).norm(), 0, 1e-9);
     }
   }
-  EXPECT_GT(hits, 60U);
+  EXPECT_GT(hits, 30U);
 }
 
 TEST(Sweep, OfACentreThatPassesACubeIsMetWhereDenseStepsMeetIt) {
@@ -122,19 +122,19 @@ TEST(Sweep, OfACentreThatPassesACubeIsMetWhereDenseStepsMeetIt) {
       EXPECT_GT(box.exteriorDistance(path.at(*contact + 1e-3)), path.radius - 1e-4);
     }
   }
-  EXPECT_GT(contacts, 300U);
+  EXPECT_GT(contacts, 100U);
 }
 
 TEST(Sweep, TakesWhatIsNoPlaceForUnknownAndStopsBeforeIt) {
   const OccupancyMap map = random_map(1);
   const auto view = MapView::of(map);
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const double not_a_number = std::numeric_limits<double>::quiet_NaN();
   for (const UnknownSpace unknown : {UnknownSpace::blocked, UnknownSpace::free}) {
     EXPECT_FALSE(view->sweep({}, 0.3, unknown));
-    const std::vector<Vector3d> nowhere{{kNaN, 0, 0}};
+    const std::vector<Vector3d> nowhere{{not_a_number, 0, 0}};
     ASSERT_TRUE(view->sweep(nowhere, 0.3, unknown));
     EXPECT_EQ(view->sweep(nowhere, 0.3, unknown)->state, Occupancy::unknown);
-    const std::vector<Vector3d> into_nowhere{{100, 0, 0}, {101, 0, 0}, {kNaN, 0, 0}};
+    const std::vector<Vector3d> into_nowhere{{100, 0, 0}, {101, 0, 0}, {not_a_number, 0, 0}};
     ASSERT_TRUE(view->sweep(into_nowhere, 0.3, unknown));
     EXPECT_EQ(view->sweep(into_nowhere, 0.3, unknown)->length, unknown == UnknownSpace::blocked ? 0 : 1);
     const std::vector<Vector3d> very_far{{-1e9, 500, 0}, {1e9, 500, 0}};
@@ -155,14 +155,14 @@ TEST(Ray, PassesTheVoxelsThatOctoMapsRayPasses) {
   const auto view = MapView::of(map);
   std::mt19937_64 random(2);
   std::size_t hits = 0;
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 500; ++i) {
     const Vector3d from = random_place(random);
     const Vector3d to = random_place(random);
     const double reach = (to - from).norm();
     for (const UnknownSpace unknown : {UnknownSpace::blocked, UnknownSpace::free}) {
       const auto hit = view->ray(from, to - from, reach, unknown);
       const double clear = hit ? hit->length : reach;
-      for (double s = 0; s < clear - 1e-6; s += 0.01) {
+      for (double s = 0; s < clear - 1e-6; s += 0.02) {
         const Vector3d at = from + s / reach * (to - from);
         ASSERT_FALSE(blocks(map.at(at), unknown)) << i << ' ' << s;
       }
@@ -173,7 +173,7 @@ TEST(Ray, PassesTheVoxelsThatOctoMapsRayPasses) {
       EXPECT_LE((hit->voxel - hit->place).cwiseAbs().maxCoeff(), 0.05 + 1e-9);
     }
   }
-  EXPECT_GT(hits, 1000U);
+  EXPECT_GT(hits, 300U);
 }
 
 TEST(Ray, ThroughTheCornersOfVoxelsEnds) {
@@ -207,10 +207,10 @@ TEST(Sweep, IgnoresAnObstacleOutsideTheCorridorAndFindsOneInsideAtTheRightPlace)
   constexpr double kRadius = 0.3;
   std::size_t outside = 0;
   std::size_t inside = 0;
-  for (int i = 0; i < 150; ++i) {
+  for (int i = 0; i < 40; ++i) {
     const std::vector<Vector3d> path{random_place(random), random_place(random)};
     const double length = length_of(path);
-    const Vector3d offset(unit(random), unit(random), unit(random));
+    const Vector3d offset = 0.5 * Vector3d(unit(random), unit(random), unit(random));
     const Vector3d at = along(path, 0.5 * (1 + unit(random)) * length) + offset;
     const Vector3d centre = 0.1 * ((at.array() / 0.1).floor() + 0.5);
     const AlignedBox3d cube(centre.array() - 0.05, centre.array() + 0.05);
@@ -224,26 +224,29 @@ TEST(Sweep, IgnoresAnObstacleOutsideTheCorridorAndFindsOneInsideAtTheRightPlace)
       if (!std::isfinite(contact)) {
         ++outside;
         ASSERT_EQ(after.has_value(), before.has_value());
-        if (after && after->length != before->length)
-          EXPECT_LT(std::abs(after->length - before->length), 1e-3);
+        if (after) {
+          EXPECT_NEAR(after->length, before->length, 1e-3);
+        }
       } else {
         ++inside;
         ASSERT_TRUE(after);
         const double expected = std::min(contact, before ? before->length : contact);
         EXPECT_NEAR(after->length, expected, 1.1e-3);
-        if (!before || contact < before->length - 2e-3) EXPECT_EQ(after->state, Occupancy::occupied);
+        if (!before || contact < before->length - 2e-3) {
+          EXPECT_EQ(after->state, Occupancy::occupied);
+        }
       }
     }
   }
-  EXPECT_GT(outside, 30U);
-  EXPECT_GT(inside, 30U);
+  EXPECT_GT(outside, 15U);
+  EXPECT_GT(inside, 15U);
 }
 
 TEST(Sweep, IsNeverWorseForSpaceThatHasBecomeKnownAsFree) {
   const OccupancyMap map = random_map(8);
   const auto view = MapView::of(map);
   std::mt19937_64 random(8);
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 60; ++i) {
     const std::vector<Vector3d> path{random_place(random), random_place(random)};
     const std::vector<Vector3d> seen{random_place(random), random_place(random)};
     const auto more = view->flown(seen, 1);

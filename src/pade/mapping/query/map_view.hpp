@@ -7,15 +7,19 @@
 //   if (hit) ...                                          // hit->length metres are clear
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
+#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "pade/core/options.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 
 namespace pade::mapping {
@@ -113,3 +117,12 @@ class MapView {
 };
 
 }  // namespace pade::mapping
+
+/// As in files and on the command line.
+template <>
+struct pade::EnumNames<pade::mapping::UnknownSpace> {
+  static constexpr std::array names = {
+      ///< value and name
+      std::pair{pade::mapping::UnknownSpace::blocked, std::string_view("blocked")},
+      std::pair{pade::mapping::UnknownSpace::free, std::string_view("free")}};
+};

@@ -32,27 +32,28 @@ std::uint64_t rectangle(const VoxelIndex& first, const VoxelIndex& last, int x, 
   return (row * 0x0101010101010101ULL) & rows;
 }
 
-/// Calls `visit(corner of the tile, tile or null beyond the octree, z, bits)` for each word of voxels in the
-/// bounds of a path that its tile does not rule out.
-template <class Wanted, class Visit>
-void for_each_word(const TileTree& tiles, const BallPath& path, const Wanted& wanted, const Visit& visit) {
+/// Voxels of a tile: the words from `first` to `last`, of each the bits.
+struct PartOfTile {
+  VoxelIndex corner;
+  int first = 0, last = 0;
+  std::uint64_t bits = 0;
+};
+
+/// Calls `visit` for the tiles that a ball may touch on its path.
+template <class Visit>
+void for_each_tile(double voxel, const BallPath& path, const Visit& visit) {
   const AlignedBox3d bounds = path.bounds();
-  const VoxelIndex first = voxel_beside(bounds.min(), tiles.voxel);
-  const VoxelIndex last = voxel_beside(bounds.max(), tiles.voxel);
-  const double reach = path.radius + kHalfDiagonal * kTileSide * tiles.voxel;
-  static const Tile kBeyond;
+  const VoxelIndex first = voxel_beside(bounds.min(), voxel);
+  const VoxelIndex last = voxel_beside(bounds.max(), voxel);
+  const double reach = path.radius + kHalfDiagonal * kTileSide * voxel;
   for (int z = first[2] >> 3; z <= last[2] >> 3; ++z) {
     for (int y = first[1] >> 3; y <= last[1] >> 3; ++y) {
       for (int x = first[0] >> 3; x <= last[0] >> 3; ++x) {
-        const bool addressed = is_addressed({8 * x, 8 * y, 8 * z});
-        const Tile& tile = addressed ? tiles.tile(x, y, z) : kBeyond;
-        if (!wanted(tile)) continue;
         const VoxelIndex corner{8 * x, 8 * y, 8 * z};
-        const Vector3d centre = corner_of({corner[0] + 4, corner[1] + 4, corner[2] + 4}, tiles.voxel);
+        const Vector3d centre = corner_of({corner[0] + 4, corner[1] + 4, corner[2] + 4}, voxel);
         if (path.squared_distance(centre) >= reach * reach) continue;
-        const std::uint64_t bits = rectangle(first, last, corner[0], corner[1]);
-        for (int k = std::max(first[2] - corner[2], 0); k <= std::min(last[2] - corner[2], 7); ++k)
-          visit(corner, tile, k, bits);
+        visit(PartOfTile{corner, std::max(first[2] - corner[2], 0), std::min(last[2] - corner[2], 7),
+                         rectangle(first, last, corner[0], corner[1])});
       }
     }
   }
@@ -66,19 +67,7 @@ class Sweep {
   /// The first contact of the ball, length and share counted along this piece alone.
   std::optional<Hit> along(const BallPath& path) {
     best_ = std::numeric_limits<double>::infinity();
-    const bool blocks = unknown_ == UnknownSpace::blocked;
-    for_each_word(
-        tiles_, path, [&](const Tile& tile) { return tile.any_occupied || (blocks && tile.any_unknown); },
-        [&](const VoxelIndex& corner, const Tile& tile, int z, std::uint64_t bits) {
-          const auto word = static_cast<std::size_t>(z);
-          const std::uint64_t blocked = tile.occupied[word] | (blocks ? ~tile.known[word] : 0);
-          for (bits &= blocked; bits != 0; bits &= bits - 1) {
-            const int bit = std::countr_zero(bits);
-            const bool occupied = (tile.occupied[word] >> bit & 1U) != 0;
-            test(path, {corner[0] + (bit & 7), corner[1] + (bit >> 3), corner[2] + z},
-                 occupied ? Occupancy::occupied : Occupancy::unknown);
-          }
-        });
+    for_each_tile(tiles_.voxel, path, [&](const PartOfTile& part) { search(path, part); });
     if (!std::isfinite(best_)) return std::nullopt;
     Hit hit;
     hit.length = best_;
@@ -89,6 +78,24 @@ class Sweep {
   }
 
  private:
+  void search(const BallPath& path, const PartOfTile& part) {
+    static const Tile beyond;
+    const VoxelIndex& corner = part.corner;
+    const bool blocks = unknown_ == UnknownSpace::blocked;
+    const Tile& tile =
+        is_addressed(corner) ? tiles_.tile(corner[0] >> 3, corner[1] >> 3, corner[2] >> 3) : beyond;
+    if (!tile.any_occupied && !(blocks && tile.any_unknown)) return;
+    for (int z = part.first; z <= part.last; ++z) {
+      const auto word = static_cast<std::size_t>(z);
+      std::uint64_t bits = part.bits & (tile.occupied[word] | (blocks ? ~tile.known[word] : 0));
+      for (; bits != 0; bits &= bits - 1) {
+        const int bit = std::countr_zero(bits);
+        const bool occupied = (tile.occupied[word] >> bit & 1U) != 0;
+        test(path, {corner[0] + (bit & 7), corner[1] + (bit >> 3), corner[2] + z},
+             occupied ? Occupancy::occupied : Occupancy::unknown);
+      }
+    }
+  }
   void test(const BallPath& path, const VoxelIndex& v, Occupancy state) {
     const AlignedBox3d box = box_of(v, tiles_.voxel);
     const Vector3d centre = box.center();
@@ -154,49 +161,62 @@ Hit blind(const Vector3d& place, double length, std::size_t segment) {
 std::map<VoxelIndex, std::array<std::uint64_t, 8>> voxels_along(std::span<const Vector3d> path, double radius,
                                                                 double voxel) {
   std::map<VoxelIndex, std::array<std::uint64_t, 8>> found;
-  TileTree grid;
-  grid.voxel = voxel;
-  const auto add = [&](const Vector3d& from, const Vector3d& to) {
-    if (!from.allFinite() || !to.allFinite()) return;
-    const BallPath whole = segment_path(from, to, radius);
-    const AlignedBox3d bounds = whole.bounds();
-    const VoxelIndex first = voxel_beside(bounds.min(), voxel);
-    const VoxelIndex last = voxel_beside(bounds.max(), voxel);
-    VoxelIndex v{};
-    for (v[2] = first[2]; v[2] <= last[2]; ++v[2]) {
-      for (v[1] = first[1]; v[1] <= last[1]; ++v[1]) {
-        for (v[0] = first[0]; v[0] <= last[0]; ++v[0]) {
-          if (!is_addressed(v) || !whole.first_contact(box_of(v, voxel))) continue;
-          auto& bits = found[{v[0] >> 3, v[1] >> 3, v[2] >> 3}];
-          bits[static_cast<std::size_t>(v[2] & 7)] |= std::uint64_t{1} << (8 * (v[1] & 7) + (v[0] & 7));
+  const auto add = [&](const BallPath& piece) {
+    for_each_tile(voxel, piece, [&](const PartOfTile& part) {
+      const VoxelIndex& corner = part.corner;
+      for (int z = part.first; z <= part.last && is_addressed(corner); ++z) {
+        for (std::uint64_t bits = part.bits; bits != 0; bits &= bits - 1) {
+          const int bit = std::countr_zero(bits);
+          const VoxelIndex v{corner[0] + (bit & 7), corner[1] + (bit >> 3), corner[2] + z};
+          if (!piece.first_contact(box_of(v, voxel))) continue;
+          found[{v[0] >> 3, v[1] >> 3, v[2] >> 3}][static_cast<std::size_t>(z)] |= std::uint64_t{1} << bit;
         }
       }
-    }
+    });
   };
-  if (path.size() == 1) add(path[0], path[0]);
-  for (std::size_t i = 0; i + 1 < path.size(); ++i) add(path[i], path[i + 1]);
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Vector3d& to = path[std::min(i + 1, path.size() - 1)];
+    if (!path[i].allFinite() || !to.allFinite()) continue;
+    const BallPath whole = segment_path(path[i], to, radius);
+    for (double s = 0; s <= whole.length; s += kPiece * voxel)
+      add({whole.at(s), whole.direction, std::min(kPiece * voxel, whole.length - s), radius});
+  }
   return found;
 }
+
+namespace {
+
+/// Where a segment has to be searched: `box` is where there can be something to meet.
+Range to_search(const BallPath& segment, const AlignedBox3d& box) {
+  if (box.isEmpty()) return {0, -1};
+  return clipped(segment, box).value_or(Range{0, -1});
+}
+
+/// What the octree can address, without the places from where a ball reaches beyond.
+AlignedBox3d addressed(double voxel, double radius) {
+  const double end = kTreeCentre * voxel - radius;
+  return {Vector3d::Constant(-end), Vector3d::Constant(end)};
+}
+
+}  // namespace
 
 std::optional<Hit> MapView::sweep(std::span<const Vector3d> path, double radius, UnknownSpace unknown) const {
   if (path.empty()) return std::nullopt;
   if (!path[0].allFinite()) return blind(path[0], 0, 0);
   Sweep search(*tiles_, unknown);
+  const bool blocks = unknown == UnknownSpace::blocked;
   const double step = kPiece * tiles_->voxel;
-  AlignedBox3d known = bounds();
-  if (!known.isEmpty())
-    known = AlignedBox3d(known.min().array() - radius - step, known.max().array() + radius + step);
+  AlignedBox3d box = blocks ? addressed(tiles_->voxel, radius) : bounds();
+  if (!blocks && !box.isEmpty())
+    box = AlignedBox3d(box.min().array() - radius - step, box.max().array() + radius + step);
   double before = 0;
   const std::size_t segments = std::max<std::size_t>(path.size() - 1, 1);
   for (std::size_t i = 0; i < segments; ++i) {
     const Vector3d& to = path[std::min(i + 1, path.size() - 1)];
     if (!to.allFinite()) return blind(path[i], before, i);
     const BallPath whole = segment_path(path[i], to, radius);
-    Range range{0, whole.length};
-    if (unknown == UnknownSpace::free) {
-      const auto seen = known.isEmpty() ? std::nullopt : clipped(whole, known);
-      range = seen.value_or(Range{0, -1});
-    }
+    const Range range = to_search(whole, box);
+    if (blocks && range.from != 0) return blind(path[i], before, i);
     // Pieces begin at the same places whatever has been clipped.
     for (double s = std::floor(range.from / step) * step; s <= range.to; s += step) {
       const BallPath piece{whole.at(s), whole.direction, std::min(step, whole.length - s), radius};
@@ -209,6 +229,8 @@ std::optional<Hit> MapView::sweep(std::span<const Vector3d> path, double radius,
       }
       if (whole.length == 0) break;
     }
+    if (blocks && range.to < whole.length)
+      return blind(whole.at(std::max(range.to, 0.0)), before + std::max(range.to, 0.0), i);
     before += whole.length;
   }
   return std::nullopt;
