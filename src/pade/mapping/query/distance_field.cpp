@@ -54,15 +54,22 @@ class Row {
  private:
   /// The first place from which on the parabola of q is below that of p < q.
   int first_below(int p, int q) {
-    const std::int64_t above = std::int64_t{(*this)[q]} + q * q - ((*this)[p] + p * p);
-    const std::int64_t twice = 2 * (q - p);
-    if (above < 0) return 0;
-    return static_cast<int>(std::min<std::int64_t>(above / twice + 1, std::numeric_limits<int>::max()));
+    const std::int32_t above = (*this)[q] + q * q - ((*this)[p] + p * p);  // below 2^25
+    return above < 0 ? 0 : above / (2 * (q - p)) + 1;
   }
   std::vector<std::int32_t> f_;
   std::vector<int> where_;
   std::vector<int> from_;
 };
+
+/// Whether the voxels from `v` to the end of its row in its tile block: bit 0 is `v`.
+std::uint64_t blocked_in_row(const TileTree& tiles, const VoxelIndex& v, bool unknown_blocks) {
+  if (!is_addressed(v)) return unknown_blocks ? 0xffU : 0;
+  const Tile& tile = tiles.tile(v[0] >> 3, v[1] >> 3, v[2] >> 3);
+  const Tile::Word& word = tile.words[static_cast<std::size_t>(v[2] & 7)];
+  const std::uint64_t blocked = word.occupied | (unknown_blocks ? ~word.known : 0);
+  return blocked >> (8 * (v[1] & 7) + (v[0] & 7));
+}
 
 }  // namespace
 
@@ -82,7 +89,7 @@ DistanceField DistanceField::of(const MapView& view, const Eigen::AlignedBox3d& 
   const double voxels = std::min(most / field.voxel_, 2.0 * kMostVoxels);
   field.most_ = static_cast<std::int32_t>(std::ceil(voxels * voxels));
   field.mark(view, unknown);
-  for (int axis = 0; axis < 3; ++axis) field.transform(axis);
+  for (int axis = 1; axis < 3; ++axis) field.transform(axis);
   return field;
 }
 
@@ -92,28 +99,43 @@ void DistanceField::mark(const MapView& view, UnknownSpace unknown) {
   squared_.assign(static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y()) *
                       static_cast<std::size_t>(size_.z()),
                   most_);
-  std::size_t i = 0;
+  std::int32_t* row = squared_.data();
   for (int z = 0; z < size_.z(); ++z) {
-    for (int y = 0; y < size_.y(); ++y) {
-      for (int x = 0; x < size_.x(); ++x, ++i) {
-        const Occupancy state = tiles.at({first_[0] + x, first_[1] + y, first_[2] + z});
-        if (state == Occupancy::occupied || (blocks && state == Occupancy::unknown)) squared_[i] = 0;
+    for (int y = 0; y < size_.y(); ++y, row += size_.x()) {
+      for (int x = 0; x < size_.x();) {
+        const VoxelIndex v{first_[0] + x, first_[1] + y, first_[2] + z};
+        const int in_tile = std::min(kTileSide - (v[0] & 7), size_.x() - x);  // of the row
+        const std::uint64_t bits = blocked_in_row(tiles, v, blocks);
+        for (int k = 0; k < in_tile; ++k)
+          if ((bits >> k & 1U) != 0) row[x + k] = 0;
+        x += in_tile;
       }
+      along_x(row);
     }
   }
 }
 
+/// The first pass: the distance along the row alone.
+void DistanceField::along_x(std::int32_t* row) const {
+  const auto pass = [&](int from, int to, int step) {
+    int distance = 2 * kMostVoxels;
+    for (int x = from; x != to; x += step) {
+      distance = row[x] == 0 ? 0 : std::min(distance + 1, 2 * kMostVoxels);
+      row[x] = std::min(row[x], distance * distance);
+    }
+  };
+  pass(0, size_.x(), 1);
+  pass(size_.x() - 1, -1, -1);
+}
+
 void DistanceField::transform(int axis) {
   const std::array<std::ptrdiff_t, 3> strides{1, size_.x(), std::ptrdiff_t{size_.x()} * size_.y()};
-  const auto along = static_cast<std::size_t>(axis);
-  const int a = axis == 0 ? 1 : 0;
-  const int b = axis == 2 ? 1 : 2;
+  const int other = axis == 2 ? 1 : 2;  // beside x
+  const std::ptrdiff_t stride = strides[static_cast<std::size_t>(axis)];
   Row row(size_[axis]);
-  for (int j = 0; j < size_[b]; ++j) {
-    for (int i = 0; i < size_[a]; ++i) {
-      std::int32_t* start = squared_.data() + i * strides[static_cast<std::size_t>(a)] +
-                            j * strides[static_cast<std::size_t>(b)];
-      const std::ptrdiff_t stride = strides[along];
+  for (int j = 0; j < size_[other]; ++j) {
+    for (int x = 0; x < size_.x(); ++x) {
+      std::int32_t* start = squared_.data() + x + j * strides[static_cast<std::size_t>(other)];
       for (int k = 0; k < size_[axis]; ++k) row[k] = start[k * stride];
       row.transform(most_, [&](int k, std::int32_t value) { start[k * stride] = value; });
     }

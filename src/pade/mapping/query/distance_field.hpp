@@ -40,6 +40,7 @@ class DistanceField {
   };
   [[nodiscard]] bool cell_at(const Eigen::Vector3d& point, Cell& cell) const;
   void mark(const MapView& view, UnknownSpace unknown);
+  void along_x(std::int32_t* row) const;
   void transform(int axis);
 
   Eigen::Vector3i size_ = Eigen::Vector3i::Zero();

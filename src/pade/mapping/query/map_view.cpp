@@ -91,8 +91,8 @@ std::shared_ptr<const MapView> MapView::flown(std::span<const Vector3d> path, do
     if (!old.any_unknown) continue;
     auto tile = std::make_shared<Tile>(old);
     for (std::size_t z = 0; z < 8; ++z) {
-      std::uint64_t fresh = inside[z] & ~old.known[z];
-      tile->known[z] |= fresh;
+      std::uint64_t fresh = inside[z] & ~old.words[z].known;
+      tile->words[z].known |= fresh;
       for (; fresh != 0; fresh &= fresh - 1)
         tile->log_odds[64 * z + static_cast<std::size_t>(std::countr_zero(fresh))] = -127;
     }

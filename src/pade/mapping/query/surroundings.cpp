@@ -81,8 +81,8 @@ class Nearest {
 std::uint64_t from_above(const Tile& tile, int first, int last, bool unknown_blocks) {
   std::uint64_t bits = 0;
   for (int z = first; z <= last; ++z) {
-    const auto word = static_cast<std::size_t>(z);
-    bits |= tile.occupied[word] | (unknown_blocks ? ~tile.known[word] : 0);
+    const Tile::Word& word = tile.words[static_cast<std::size_t>(z)];
+    bits |= word.occupied | (unknown_blocks ? ~word.known : 0);
   }
   return bits;
 }

@@ -18,6 +18,7 @@ using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
 constexpr double kPiece = 8;              // of a segment that is searched at a time, voxels
+constexpr double kHalfRow = 4.0621;       // half of the diagonal of 8 x 1 x 1 voxels
 constexpr double kHalfDiagonal = 0.8661;  // of a cube
 
 /// Bits of the rows y and columns x of a word from first to last, of a tile that begins at `corner`.
@@ -86,14 +87,25 @@ class Sweep {
         is_addressed(corner) ? tiles_.tile(corner[0] >> 3, corner[1] >> 3, corner[2] >> 3) : beyond;
     if (!tile.any_occupied && !(blocks && tile.any_unknown)) return;
     for (int z = part.first; z <= part.last; ++z) {
-      const auto word = static_cast<std::size_t>(z);
-      std::uint64_t bits = part.bits & (tile.occupied[word] | (blocks ? ~tile.known[word] : 0));
-      for (; bits != 0; bits &= bits - 1) {
-        const int bit = std::countr_zero(bits);
-        const bool occupied = (tile.occupied[word] >> bit & 1U) != 0;
-        test(path, {corner[0] + (bit & 7), corner[1] + (bit >> 3), corner[2] + z},
-             occupied ? Occupancy::occupied : Occupancy::unknown);
+      const Tile::Word& word = tile.words[static_cast<std::size_t>(z)];
+      const std::uint64_t bits = part.bits & (word.occupied | (blocks ? ~word.known : 0));
+      for (int y = 0; y < kTileSide && bits >> (8 * y) != 0; ++y) {
+        const std::uint64_t row = bits >> (8 * y) & 0xffU;
+        if (row != 0)
+          search_row(path, {corner[0], corner[1] + y, corner[2] + z}, row, word.occupied >> (8 * y));
       }
+    }
+  }
+  /// Of a row of 8 voxels along x.
+  void search_row(const BallPath& path, const VoxelIndex& first, std::uint64_t row, std::uint64_t occupied) {
+    const double side = tiles_.voxel;
+    const Vector3d middle = corner_of(first, side) + side * Vector3d(kTileSide / 2, 0.5, 0.5);
+    const double reach = path.radius + kHalfRow * side;
+    if (path.squared_distance(middle) >= reach * reach) return;
+    for (; row != 0; row &= row - 1) {
+      const int x = std::countr_zero(row);
+      test(path, {first[0] + x, first[1], first[2]},
+           (occupied >> x & 1U) != 0 ? Occupancy::occupied : Occupancy::unknown);
     }
   }
   void test(const BallPath& path, const VoxelIndex& v, Occupancy state) {

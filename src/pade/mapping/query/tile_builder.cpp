@@ -26,8 +26,26 @@ struct UniformTiles {
 };
 
 void Tile::summarise() {
-  any_occupied = std::any_of(occupied.begin(), occupied.end(), [](std::uint64_t word) { return word != 0; });
-  any_unknown = std::any_of(known.begin(), known.end(), [](std::uint64_t word) { return ~word != 0; });
+  any_occupied = std::any_of(words.begin(), words.end(), [](const Word& word) { return word.occupied != 0; });
+  any_unknown = std::any_of(words.begin(), words.end(), [](const Word& word) { return ~word.known != 0; });
+}
+
+void TileTree::index() {
+  constexpr std::size_t kMostGroups = 1U << 16U;
+  constexpr int kTilesOfAGroup = 8;
+  groups.clear();
+  if (bounds.first[0] > bounds.last[0]) return;
+  std::size_t count = 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    first_group[axis] = bounds.first[axis] / kTilesOfAGroup;
+    group_counts[axis] = bounds.last[axis] / kTilesOfAGroup - first_group[axis] + 1;
+    count *= static_cast<std::size_t>(group_counts[axis]);
+  }
+  if (count > kMostGroups) return;
+  for (int z = 0; z < group_counts[2]; ++z)
+    for (int y = 0; y < group_counts[1]; ++y)
+      for (int x = 0; x < group_counts[0]; ++x)
+        groups.push_back(&group_by_nodes(first_group[0] + x, first_group[1] + y, first_group[2] + z));
 }
 
 namespace {
@@ -39,8 +57,8 @@ int quantised(double log_odds, double step) {
 std::shared_ptr<const Tile> make_uniform(int value) {
   auto tile = std::make_shared<Tile>();
   if (value != UniformTiles::kUnknown) {
-    tile->known.fill(~std::uint64_t{0});
-    if (value >= 256) tile->occupied.fill(~std::uint64_t{0});
+    const std::uint64_t all = ~std::uint64_t{0};
+    tile->words.fill({all, value >= 256 ? all : 0});
     tile->log_odds.fill(static_cast<std::int8_t>(value % 256 - 128));
   }
   tile->summarise();
@@ -215,9 +233,9 @@ class Builder {
     const auto row = ((std::uint64_t{1} << side) - 1) << corner[0];
     for (int z = corner[2]; z < corner[2] + side; ++z) {
       for (int y = corner[1]; y < corner[1] + side; ++y) {
-        const auto word = static_cast<std::size_t>(z);
-        tile.known[word] |= row << (8 * y);
-        if (is_occupied) tile.occupied[word] |= row << (8 * y);
+        Tile::Word& word = tile.words[static_cast<std::size_t>(z)];
+        word.known |= row << (8 * y);
+        if (is_occupied) word.occupied |= row << (8 * y);
         const auto first = tile.log_odds.begin() + 64 * z + 8 * y + corner[0];
         std::fill(first, first + side, steps);
       }
@@ -281,6 +299,7 @@ TileTree rebuilt(TileTree tiles, const octomap::OcTree& octree, std::span<const 
   const std::lock_guard lock(tiles.uniform->mutex);
   Builder builder(tiles, octree, window);
   tiles.world = builder.build<TileWorld>(octree.getRoot(), 0, tiles.world, touched);
+  tiles.index();
   return tiles;
 }
 
@@ -293,6 +312,7 @@ TileTree with_tiles(TileTree tiles, std::vector<Changed> changed) {
     }
   }
   tiles.world = replaced<TileWorld>(tiles.world, changed);
+  tiles.index();
   return tiles;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "pade/mapping/occupancy_map.hpp"
 
@@ -20,8 +21,11 @@ inline constexpr int kTilesPerAxis = kVoxelsPerAxis / kTileSide;
 
 /// 8 x 8 x 8 voxels: word z, bit 8 y + x.
 struct Tile {
-  std::array<std::uint64_t, 8> known{};
-  std::array<std::uint64_t, 8> occupied{};
+  struct Word {
+    std::uint64_t known = 0;
+    std::uint64_t occupied = 0;
+  };
+  std::array<Word, 8> words{};
   std::array<std::int8_t, 512> log_odds{};  ///< in steps of TileTree::step(), of known voxels
   bool any_occupied = false;
   bool any_unknown = true;
@@ -29,10 +33,10 @@ struct Tile {
   /// Sets the two flags.
   void summarise();
   [[nodiscard]] Occupancy at(int x, int y, int z) const {
-    const auto word = static_cast<std::size_t>(z);
+    const Word& word = words[static_cast<std::size_t>(z)];
     const int bit = 8 * y + x;
-    if ((occupied[word] >> bit & 1U) != 0) return Occupancy::occupied;
-    return (known[word] >> bit & 1U) != 0 ? Occupancy::free : Occupancy::unknown;
+    if ((word.occupied >> bit & 1U) != 0) return Occupancy::occupied;
+    return (word.known >> bit & 1U) != 0 ? Occupancy::free : Occupancy::unknown;
   }
 };
 
@@ -64,16 +68,36 @@ struct TileTree {
   TileBounds bounds;                      ///< nothing is known outside
   double voxel = 0;                       ///< m
   double step = 0;                        ///< of the log-odds in a tile
+  /// The groups within the bounds, x fastest, where they are not too many: a way past the upper nodes.
+  std::vector<const TileGroup*> groups;
+  VoxelIndex first_group{};
+  VoxelIndex group_counts{};
+
+  /// Makes `groups` anew; to be called where `world` or `bounds` has changed.
+  void index();
 
   /// The tile of 8 voxels to a side; tile coordinates from 0 to kTilesPerAxis - 1.
   [[nodiscard]] const Tile& tile(int x, int y, int z) const {
-    const auto index = [&](int shift, int mask) {
-      const int bits = mask == 15 ? 4 : 3;
+    const auto slot = static_cast<std::size_t>((x & 7) | (y & 7) << 3 | (z & 7) << 6);
+    return *group(x >> 3, y >> 3, z >> 3).children[slot];
+  }
+  [[nodiscard]] const TileGroup& group(int x, int y, int z) const {
+    if (groups.empty()) return group_by_nodes(x, y, z);
+    const auto dx = static_cast<unsigned>(x - first_group[0]);
+    const auto dy = static_cast<unsigned>(y - first_group[1]);
+    const auto dz = static_cast<unsigned>(z - first_group[2]);
+    const auto nx = static_cast<unsigned>(group_counts[0]);
+    const auto ny = static_cast<unsigned>(group_counts[1]);
+    if (dx >= nx || dy >= ny || dz >= static_cast<unsigned>(group_counts[2])) return group_by_nodes(x, y, z);
+    return *groups[(std::size_t{dz} * ny + dy) * nx + dx];
+  }
+  [[nodiscard]] const TileGroup& group_by_nodes(int x, int y, int z) const {
+    const auto slot = [&](int shift, int bits) {
+      const int mask = (1 << bits) - 1;
       return static_cast<std::size_t>((x >> shift & mask) | (y >> shift & mask) << bits |
                                       (z >> shift & mask) << (2 * bits));
     };
-    return *world->children[index(9, 15)]->children[index(6, 7)]->children[index(3, 7)]->children[index(0,
-                                                                                                        7)];
+    return *world->children[slot(6, 4)]->children[slot(3, 3)]->children[slot(0, 3)];
   }
   /// Beyond what can be addressed: unknown.
   [[nodiscard]] Occupancy at(const VoxelIndex& v) const {

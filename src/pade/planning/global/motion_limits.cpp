@@ -11,9 +11,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kStraight = 1e-6;     // sine of half of an angle that is none
-constexpr double kDeviation = 0.001;   // of straight lines from the motion, m
-constexpr double kLongestStep = 0.05;  // s
+constexpr double kStraight = 1e-6;         // sine of half of an angle that is none
+constexpr double kDeviation = 0.001;       // of straight lines from the motion, m
+constexpr double kLongestInterval = 0.05;  // s
+constexpr double kShortestPiece = 1e-9;    // that is not left out, s
 
 /// Constant acceleration.
 struct Piece {
@@ -81,7 +82,7 @@ class Corners {
     const Vector3d& u = directions_[leg];
     Vector3d at = corners_[leg] + cut(leg) * u;
     const auto add = [&](double duration, double speed, double rate) {
-      if (!(duration > 0)) return;
+      if (!(duration > kShortestPiece)) return;
       pieces.push_back({duration, at, speed * u, rate * u});
       at += (speed * duration + 0.5 * rate * duration * duration) * u;
     };
@@ -94,6 +95,7 @@ class Corners {
     const double leg = cut(i);
     if (!(leg > 0 && speeds_[i] > 0)) return;
     const double duration = 2 * leg / speeds_[i];
+    if (!(duration > kShortestPiece)) return;
     const Vector3d& before = directions_[i - 1];
     const Vector3d& after = directions_[i];
     pieces.push_back({duration, corners_[i] - leg * before, speeds_[i] * before,
@@ -120,7 +122,7 @@ std::vector<MotionPoint> motion_along(std::span<const Vector3d> corners, std::sp
   std::vector<MotionPoint> points;
   if (corners.empty()) return points;
   if (corners.size() == 1) return {{0, corners[0], Vector3d::Zero()}};
-  const double step = std::min(kLongestStep, std::sqrt(8 * kDeviation / limits.acceleration));
+  const double step = std::min(kLongestInterval, std::sqrt(8 * kDeviation / limits.acceleration));
   double begin = 0;
   for (const Piece& piece : Corners(corners, rounding, limits).pieces()) {
     const auto steps = static_cast<int>(std::ceil(piece.duration / step));
