@@ -118,12 +118,12 @@ AlignedBox3d MapView::bounds() const {
 
 Occupancy MapView::at(const Vector3d& point) const {
   VoxelIndex v;
-  return voxel_at(point, 1 / tiles_->voxel, v) ? tiles_->at(v) : Occupancy::unknown;
+  return voxel_at(point, tiles_->per_voxel, v) ? tiles_->at(v) : Occupancy::unknown;
 }
 
 double MapView::probability(const Vector3d& point) const {
   VoxelIndex v;
-  if (!voxel_at(point, 1 / tiles_->voxel, v) || tiles_->at(v) == Occupancy::unknown)
+  if (!voxel_at(point, tiles_->per_voxel, v) || tiles_->at(v) == Occupancy::unknown)
     return std::numeric_limits<double>::quiet_NaN();
   return probability_of(tiles_->tile(v[0] >> 3, v[1] >> 3, v[2] >> 3), index_in_tile(v), tiles_->step);
 }

@@ -17,8 +17,8 @@ namespace {
 using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
-constexpr double kPiece = 8;              // of a segment that is searched at a time, voxels
-constexpr double kHalfRow = 4.0621;       // half of the diagonal of 8 x 1 x 1 voxels
+constexpr double kPiece = 16;             // of a segment that is searched at a time, voxels
+constexpr double kParallel = 1e-6;        // of a line to the x axis: squared sine
 constexpr double kHalfDiagonal = 0.8661;  // of a cube
 
 /// Bits of the rows y and columns x of a word from first to last, of a tile that begins at `corner`.
@@ -96,12 +96,27 @@ class Sweep {
       }
     }
   }
-  /// Of a row of 8 voxels along x.
+  /// Of a row of 8 voxels along x: those between the places where it enters and leaves the cylinder around
+  /// the line of the centre. The squared distance from the line is a parabola in x.
   void search_row(const BallPath& path, const VoxelIndex& first, std::uint64_t row, std::uint64_t occupied) {
     const double side = tiles_.voxel;
-    const Vector3d middle = corner_of(first, side) + side * Vector3d(kTileSide / 2, 0.5, 0.5);
-    const double reach = path.radius + kHalfRow * side;
-    if (path.squared_distance(middle) >= reach * reach) return;
+    const double reach = path.radius + kHalfDiagonal * side;
+    const Vector3d to = corner_of(first, side) + Vector3d::Constant(0.5 * side) - path.start;
+    const double along = to.dot(path.direction);
+    const double a = 1 - path.direction.x() * path.direction.x();
+    const double b = to.x() - along * path.direction.x();
+    const double c = to.squaredNorm() - along * along - reach * reach;
+    if (a > kParallel) {
+      const double root = b * b - a * c;
+      if (root <= 0) return;
+      const double half = std::sqrt(root);
+      const double from = std::max(std::ceil((-b - half) / (a * side)), 0.0);
+      const double last = std::min(std::floor((-b + half) / (a * side)), 7.0);
+      if (from > last) return;
+      row &= (0xffU >> (7 - static_cast<int>(last))) & (0xffU << static_cast<int>(from));
+    } else if (c >= 0) {
+      return;
+    }
     for (; row != 0; row &= row - 1) {
       const int x = std::countr_zero(row);
       test(path, {first[0] + x, first[1], first[2]},

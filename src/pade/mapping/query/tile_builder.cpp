@@ -285,6 +285,7 @@ std::shared_ptr<const Part> replaced(const std::shared_ptr<const Part>& old, std
 TileTree empty_tiles(const octomap::OcTree& octree) {
   TileTree tiles;
   tiles.voxel = octree.getResolution();
+  tiles.per_voxel = 1 / tiles.voxel;
   const double most =
       std::max(std::abs(octree.getClampingThresMinLog()), std::abs(octree.getClampingThresMaxLog()));
   tiles.step = std::max(most, 1e-3) / 127;

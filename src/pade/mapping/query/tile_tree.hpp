@@ -67,6 +67,7 @@ struct TileTree {
   std::shared_ptr<UniformTiles> uniform;  ///< used only by the thread that makes a new tree
   TileBounds bounds;                      ///< nothing is known outside
   double voxel = 0;                       ///< m
+  double per_voxel = 0;                   ///< 1 / voxel
   double step = 0;                        ///< of the log-odds in a tile
   /// The groups within the bounds, x fastest, where they are not too many: a way past the upper nodes.
   std::vector<const TileGroup*> groups;
