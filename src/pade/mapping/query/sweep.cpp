@@ -17,7 +17,7 @@ namespace {
 using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
-constexpr double kPiece = 16;             // of a segment that is searched at a time, voxels
+constexpr double kPiece = 8;              // of a segment that is searched at a time, voxels
 constexpr double kParallel = 1e-6;        // of a line to the x axis: squared sine
 constexpr double kHalfDiagonal = 0.8661;  // of a cube
 
@@ -40,6 +40,16 @@ struct PartOfTile {
   std::uint64_t bits = 0;
 };
 
+/// From first to last, or from last to first where the path leads that way: what is met early comes early.
+template <class Visit>
+void in_order(double direction, int first, int last, const Visit& visit) {
+  if (direction >= 0) {
+    for (int i = first; i <= last; ++i) visit(i);
+  } else {
+    for (int i = last; i >= first; --i) visit(i);
+  }
+}
+
 /// Calls `visit` for the tiles that a ball may touch on its path.
 template <class Visit>
 void for_each_tile(double voxel, const BallPath& path, const Visit& visit) {
@@ -47,17 +57,18 @@ void for_each_tile(double voxel, const BallPath& path, const Visit& visit) {
   const VoxelIndex first = voxel_beside(bounds.min(), voxel);
   const VoxelIndex last = voxel_beside(bounds.max(), voxel);
   const double reach = path.radius + kHalfDiagonal * kTileSide * voxel;
-  for (int z = first[2] >> 3; z <= last[2] >> 3; ++z) {
-    for (int y = first[1] >> 3; y <= last[1] >> 3; ++y) {
-      for (int x = first[0] >> 3; x <= last[0] >> 3; ++x) {
+  const Vector3d& d = path.direction;
+  in_order(d.z(), first[2] >> 3, last[2] >> 3, [&](int z) {
+    in_order(d.y(), first[1] >> 3, last[1] >> 3, [&](int y) {
+      in_order(d.x(), first[0] >> 3, last[0] >> 3, [&](int x) {
         const VoxelIndex corner{8 * x, 8 * y, 8 * z};
         const Vector3d centre = corner_of({corner[0] + 4, corner[1] + 4, corner[2] + 4}, voxel);
-        if (path.squared_distance(centre) >= reach * reach) continue;
+        if (path.squared_distance(centre) >= reach * reach) return;
         visit(PartOfTile{corner, std::max(first[2] - corner[2], 0), std::min(last[2] - corner[2], 7),
                          rectangle(first, last, corner[0], corner[1])});
-      }
-    }
-  }
+      });
+    });
+  });
 }
 
 /// Searches the pieces of a path in order.
@@ -86,15 +97,16 @@ class Sweep {
     const Tile& tile =
         is_addressed(corner) ? tiles_.tile(corner[0] >> 3, corner[1] >> 3, corner[2] >> 3) : beyond;
     if (!tile.any_occupied && !(blocks && tile.any_unknown)) return;
-    for (int z = part.first; z <= part.last; ++z) {
+    in_order(path.direction.z(), part.first, part.last, [&](int z) {
       const Tile::Word& word = tile.words[static_cast<std::size_t>(z)];
       const std::uint64_t bits = part.bits & (word.occupied | (blocks ? ~word.known : 0));
-      for (int y = 0; y < kTileSide && bits >> (8 * y) != 0; ++y) {
+      if (bits == 0) return;
+      in_order(path.direction.y(), 0, kTileSide - 1, [&](int y) {
         const std::uint64_t row = bits >> (8 * y) & 0xffU;
         if (row != 0)
           search_row(path, {corner[0], corner[1] + y, corner[2] + z}, row, word.occupied >> (8 * y));
-      }
-    }
+      });
+    });
   }
   /// Of a row of 8 voxels along x: those between the places where it enters and leaves the cylinder around
   /// the line of the centre. The squared distance from the line is a parabola in x.
@@ -117,18 +129,22 @@ class Sweep {
     } else if (c >= 0) {
       return;
     }
-    for (; row != 0; row &= row - 1) {
-      const int x = std::countr_zero(row);
+    in_order(path.direction.x(), std::countr_zero(row), 7, [&](int x) {
+      if ((row >> x & 1U) == 0) return;
       test(path, {first[0] + x, first[1], first[2]},
            (occupied >> x & 1U) != 0 ? Occupancy::occupied : Occupancy::unknown);
-    }
+    });
   }
   void test(const BallPath& path, const VoxelIndex& v, Occupancy state) {
     const AlignedBox3d box = box_of(v, tiles_.voxel);
-    const Vector3d centre = box.center();
+    const Vector3d to = box.center() - path.start;
     const double reach = path.radius + kHalfDiagonal * tiles_.voxel;
-    if (path.squared_distance(centre) >= reach * reach) return;
-    if ((centre - path.start).dot(path.direction) - reach > best_) return;
+    const double along = to.dot(path.direction);
+    const double half = reach * reach - (to.squaredNorm() - along * along);  // of the chord, squared
+    const double outside = std::max({-along, along - path.length, 0.0});  // before the start or past the end
+    if (half <= outside * outside) return;
+    const double beyond = along - best_;
+    if (beyond > 0 && beyond * beyond > half) return;  // whatever touches it, touches it later
     const std::optional<double> contact = path.first_contact(box);
     if (!contact || *contact > best_) return;
     const bool first_of_its_kind = state == Occupancy::occupied && state_ != Occupancy::occupied;
