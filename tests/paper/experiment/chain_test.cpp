@@ -23,7 +23,7 @@ class Chain : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     root_ = std::make_unique<test::TemporaryFolder>();
-    test::write_flight(root_->path() / "forward", "forward", 7, simulation::analytic_camera(240, 180));
+    test::write_flight(root_->path() / "forward", "forward", 10, simulation::analytic_camera(320, 240));
     sequence_ = std::make_unique<io::Sequence>(io::Sequence::open(root_->path() / "forward").value());
   }
   static void TearDownTestSuite() {
@@ -46,6 +46,9 @@ class Chain : public testing::Test {
   static double error(const JobResult& result, const std::string& cell) {
     return result.cell(cell)->accuracy.all.mean;
   }
+  static double median(const JobResult& result, const std::string& cell) {
+    return result.cell(cell)->accuracy.all.median;
+  }
 
   static inline std::unique_ptr<test::TemporaryFolder> root_;
   static inline std::unique_ptr<io::Sequence> sequence_;
@@ -66,7 +69,7 @@ TEST_F(Chain, EachStepIsBetterThanThePaperAndSeesMostPixels) {
   const JobResult literal = run("literal", {});
   for (const std::string name : {"one-pair", "two-view", "multi-view"}) {
     const JobResult result = run(name, {});
-    EXPECT_LT(error(result, name), 0.7 * error(literal, "literal")) << name;
+    EXPECT_LT(error(result, name), 0.8 * error(literal, "literal")) << name;
     EXPECT_GT(result.cell(name)->accuracy.all.coverage, 0.7) << name;
     // With exact poses the scale is right.
     EXPECT_NEAR(error(result, scaled_cell(name)) / error(result, name), 1, 0.1) << name;
@@ -79,7 +82,7 @@ TEST_F(Chain, NoiseLeavesTheDefaultLittleButItsScale) {
   const JobResult aligned = run("multi-view", noise);
   EXPECT_LT(error(aligned, "multi-view"), error(given, "multi-view-given"));
   EXPECT_LT(error(aligned, scaled_cell("multi-view")), 0.6 * error(aligned, "multi-view"));
-  EXPECT_LT(error(aligned, scaled_cell("multi-view")), 0.6 * error(given, scaled_cell("multi-view-given")));
+  EXPECT_LT(median(aligned, scaled_cell("multi-view")), 0.6 * median(given, scaled_cell("multi-view-given")));
 }
 
 TEST_F(Chain, AJobGivesTheSameEachTimeAndComesBackFromItsFile) {
