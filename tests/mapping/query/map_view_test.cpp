@@ -1,11 +1,14 @@
 #include "pade/mapping/query/map_view.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <random>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -162,6 +165,40 @@ TEST(MapView, TakesWhereTheVehicleWasForFreeButNoObstacle) {
       EXPECT_LT(flown->probability(point), 0.5);
     }
   }
+}
+
+// For the thread sanitizer: the mapper goes on while a planner asks the views that it has put out.
+TEST(MapView, IsAskedByAPlannerWhileTheMapperGoesOn) {
+  const simulation::AnalyticFlight flight =
+      *simulation::make_analytic_flight("forward", 6, simulation::analytic_camera(64, 48));
+  OccupancyMap map = std::move(OccupancyMap::create()).value();
+  std::mutex mutex;
+  auto latest = MapView::of(map);
+  std::atomic<bool> done = false;
+  std::size_t asked = 0;
+  std::thread planner([&] {
+    do {
+      std::shared_ptr<const MapView> view;
+      {
+        const std::lock_guard lock(mutex);
+        view = latest;
+      }
+      const std::vector<Vector3d> path{flight.T_world_camera[0].translation,
+                                       flight.T_world_camera[5].translation};
+      const auto hit = view->flown(path, 0.3)->sweep(path, 0.3, UnknownSpace::blocked);
+      asked += hit ? 1 : 2;
+    } while (!done);
+  });
+  for (std::size_t k = 0; k < flight.times.size(); ++k) {
+    auto next =
+        latest->after(map, map.integrate(depth_image(flight, k), flight.camera, flight.T_world_camera[k]));
+    const std::lock_guard lock(mutex);
+    latest = std::move(next);
+  }
+  done = true;
+  planner.join();
+  EXPECT_GT(asked, 0U);
+  EXPECT_NE(latest->in_box(map.bounds()).free, 0U);
 }
 
 }  // namespace
