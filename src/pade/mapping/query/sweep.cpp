@@ -79,6 +79,8 @@ class Sweep {
   /// The first contact of the ball, length and share counted along this piece alone.
   std::optional<Hit> along(const BallPath& path) {
     best_ = std::numeric_limits<double>::infinity();
+    across_ = 1 - path.direction.x() * path.direction.x();
+    per_across_ = 1 / (across_ * tiles_.voxel);
     for_each_tile(tiles_.voxel, path, [&](const PartOfTile& part) { search(path, part); });
     if (!std::isfinite(best_)) return std::nullopt;
     Hit hit;
@@ -115,17 +117,17 @@ class Sweep {
     const double reach = path.radius + kHalfDiagonal * side;
     const Vector3d to = corner_of(first, side) + Vector3d::Constant(0.5 * side) - path.start;
     const double along = to.dot(path.direction);
-    const double a = 1 - path.direction.x() * path.direction.x();
     const double b = to.x() - along * path.direction.x();
     const double c = to.squaredNorm() - along * along - reach * reach;
-    if (a > kParallel) {
-      const double root = b * b - a * c;
+    if (across_ > kParallel) {
+      const double root = b * b - across_ * c;
       if (root <= 0) return;
       const double half = std::sqrt(root);
-      const double from = std::max(std::ceil((-b - half) / (a * side)), 0.0);
-      const double last = std::min(std::floor((-b + half) / (a * side)), 7.0);
-      if (from > last) return;
-      row &= (0xffU >> (7 - static_cast<int>(last))) & (0xffU << static_cast<int>(from));
+      const double from = (-b - half) * per_across_;  // voxels
+      const double last = (-b + half) * per_across_;
+      if (last < 0 || from > kTileSide - 1) return;
+      const int low = from > 0 ? static_cast<int>(from) : 0;  // rounded outwards: what is too much is tested
+      row &= (0xffU >> (kTileSide - 1 - std::min(static_cast<int>(last), kTileSide - 1))) & (0xffU << low);
     } else if (c >= 0) {
       return;
     }
@@ -156,6 +158,8 @@ class Sweep {
 
   const TileTree& tiles_;
   UnknownSpace unknown_;
+  double across_ = 0;      // squared sine of the angle between the path and the x axis
+  double per_across_ = 0;  // 1 / (across * voxel)
   double best_ = 0;
   VoxelIndex voxel_{};
   Occupancy state_ = Occupancy::unknown;
