@@ -27,11 +27,13 @@ class RecentFrames {
   [[nodiscard]] const TrackedFrame& before(int frames) const {
     return frames_[frames_.size() - static_cast<std::size_t>(frames)];
   }
-  /// Takes a frame in, and lets go of those beyond `most`.
+  /// Takes a frame in, and lets go of the oldest.
+  /// @param frame  newer than last(). @param most  frames that are kept
   void push(TrackedFrame frame, int most);
 
-  /// Frames back to views of `newest` whose baselines double, the longest one last.
-  /// @param count  at most so many views. @param frames  the oldest is at most so old
+  /// Views whose baselines double, the longest one last: how many frames each is back.
+  /// @param newest  what they are views of, not yet taken in. @param count  at most so many views. @param
+  /// frames  the oldest is at most so old
   [[nodiscard]] std::vector<int> views(const Frame& newest, int count, int frames) const;
 
   /// Stretches the steps between the frames about the last one.
