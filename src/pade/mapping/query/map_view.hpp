@@ -95,6 +95,7 @@ class MapView {
   /// @param origin     world, m
   /// @param direction  of any length but zero
   /// @param reach      m
+  /// @param unknown    whether space that nobody has seen blocks
   [[nodiscard]] std::optional<Hit> ray(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                        double reach, UnknownSpace unknown) const;
 
@@ -104,6 +105,7 @@ class MapView {
   /// @param path    world, m; one point is a ball at rest, no point is never blocked. A point that is not
   ///                finite blocks the path where its segment begins, as unknown space
   /// @param radius  m, above 0
+  /// @param unknown  whether space that nobody has seen blocks
   [[nodiscard]] std::optional<Hit> sweep(std::span<const Eigen::Vector3d> path, double radius,
                                          UnknownSpace unknown) const;
 
