@@ -61,7 +61,7 @@ struct TileBounds {
   VoxelIndex last{-1, -1, -1};
 };
 
-/// All tiles of a map. Copying it costs nothing.
+/// All tiles of a map. Copies share them.
 struct TileTree {
   std::shared_ptr<const TileWorld> world;
   std::shared_ptr<UniformTiles> uniform;  ///< used only by the thread that makes a new tree
