@@ -54,8 +54,11 @@ Result<Pose> Trajectory::at(Time time, double largest_gap) const {
   const StampedPose& before = *std::prev(after);
   const double gap = seconds_between(before.time, after->time);
   if (gap > largest_gap) {
-    return Error{fmt::format("time {} lies in a gap of {:.3f} s between poses, expected at most {:g} s",
-                             to_string(time), gap, largest_gap)};
+    // Whole numbers that rise by 10 to 1000 are how cameras count milliseconds.
+    const bool whole = gap >= 10 && gap <= 1000 && std::abs(gap - std::round(gap)) < 1e-9;
+    return Error{fmt::format(
+        "time {} lies in a gap of {:.3f} s between poses, expected at most {:g} s{}", to_string(time), gap,
+        largest_gap, whole ? " (stamps in milliseconds? write seconds, or [ms] into a heading)" : "")};
   }
   return interpolate(before.pose, after->pose, seconds_between(before.time, time) / gap);
 }
