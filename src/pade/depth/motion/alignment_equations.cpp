@@ -82,7 +82,7 @@ std::vector<Seen> see(const Camera& camera, const cv::Mat& image, int level,
     Seen seen;
     seen.point = i;
     seen.grey = (found.grey - static_cast<float>(at.offset)) * per_gain;
-    seen.by_log_depth = j.dot(Y);                      // dX = Y dlog Z
+    seen.by_log_depth = j.dot(Y);  // dX = Y dlog Z
     // dX = dt + theta x Y
     seen.by_motion << j.x(), j.y(), j.z(), Y.y() * j.z() - Y.z() * j.y(), Y.z() * j.x() - Y.x() * j.z(),
         Y.x() * j.y() - Y.y() * j.x();

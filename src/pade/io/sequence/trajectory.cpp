@@ -48,8 +48,13 @@ Result<Pose> Trajectory::at(Time time, double largest_gap) const {
   if (after != rows_.begin() && is_now(*std::prev(after))) return std::prev(after)->pose;
   if (rows_.empty()) return Error{"there are no poses"};
   if (after == rows_.begin() || after == rows_.end()) {
-    return Error{fmt::format("time {} lies outside the poses, which cover {} to {}", to_string(time),
-                             to_string(rows_.front().time), to_string(rows_.back().time))};
+    const double apart =
+        std::max(seconds_between(time, rows_.front().time), seconds_between(rows_.back().time, time));
+    constexpr double kAnother = 10;  // s
+    return Error{
+        fmt::format("time {} lies outside the poses, which cover {} to {}{}", to_string(time),
+                    to_string(rows_.front().time), to_string(rows_.back().time),
+                    apart > kAnother ? " (of another flight, or of a clock with another zero?)" : "")};
   }
   const StampedPose& before = *std::prev(after);
   const double gap = seconds_between(before.time, after->time);

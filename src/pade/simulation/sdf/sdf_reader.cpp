@@ -179,7 +179,7 @@ Result<sdf::SDFPtr> Reader::parse() {
       attempt(file_, later.empty() ? std::nullopt : std::optional(without_unseen(*text)), config);
   if (!first.error) return first.document;
   const Attempt again = attempt(file_, without_unseen(*text), config);
-  if (again.error) return *first.error;
+  if (again.error) return *again.error;  // what is seen is wrong, too
   world_.warnings.push_back(first.error->message + ": left out, since nobody sees it");
   return again.document;
 }
