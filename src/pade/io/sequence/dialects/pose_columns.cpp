@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -52,12 +53,15 @@ Fields parts_of(std::string_view heading) {
   return parts;
 }
 
-std::optional<std::size_t> column_of(const Names& names, std::initializer_list<std::string_view> wanted) {
+std::optional<std::size_t> column_of(const Names& names, std::span<const std::string_view> wanted) {
   for (const std::string_view one : wanted) {
     const auto found = std::find(names.begin(), names.end(), one);
     if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
   }
   return std::nullopt;
+}
+std::optional<std::size_t> column_of(const Names& names, std::initializer_list<std::string_view> wanted) {
+  return column_of(names, std::span(wanted.begin(), wanted.size()));
 }
 
 std::optional<TimeUnit> unit_in(std::string_view part) {
@@ -74,7 +78,7 @@ std::optional<TimeUnit> unit_in(std::string_view part) {
 }
 
 /// What columns of time are called, as plain() leaves it.
-constexpr std::initializer_list<std::string_view> kTimes = {
+constexpr std::array<std::string_view, 19> kTimes = {
     "timestamp", "time",        "ts",       "times",       "t",      "stamp",      "timestampns",
     "timens",    "timestampus", "timeus",   "timestampms", "timems", "timestamps", "headerstamp",
     "tsec",      "stampsecs",   "stampsec", "secs",        "sec"};
