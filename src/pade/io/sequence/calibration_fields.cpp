@@ -150,7 +150,7 @@ std::optional<std::vector<double>> CalibrationFields::numbers(std::initializer_l
   return std::nullopt;
 }
 
-std::optional<Pose> CalibrationFields::transform(std::string_view name) {
+std::optional<Pose> CalibrationFields::transform(std::string_view name, bool short_form) {
   constexpr std::string_view kExpected =
       "a rigid transform: 4x4 finite numbers by rows, a rotation matrix and a translation above 0 0 0 1";
   const auto values = numbers({name}, kExpected);
@@ -160,7 +160,7 @@ std::optional<Pose> CalibrationFields::transform(std::string_view name) {
     return std::nullopt;
   };
   std::vector<double> all = *values;
-  if (all.size() == 12) all.insert(all.end(), {0, 0, 0, 1});
+  if (short_form && all.size() == 12) all.insert(all.end(), {0, 0, 0, 1});
   if (all.size() != 16) return complain();
   const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(all.data());
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();

@@ -41,8 +41,9 @@ class CalibrationFields {
   /// A list of finite numbers, or a matrix {rows, cols, data}. Nested lists are flattened row by row.
   std::optional<std::vector<double>> numbers(std::initializer_list<std::string_view> names,
                                              std::string_view expected);
-  /// A rigid transform of 16 numbers (4x4 by rows; or 12, without the last row), checked to be one.
-  std::optional<Pose> transform(std::string_view name);
+  /// A rigid transform of 16 numbers (4x4 by rows), checked to be one.
+  /// @param short_form  also 12, without the last row
+  std::optional<Pose> transform(std::string_view name, bool short_form = false);
 
   /// The key of the file that equals one of `names` but for case, blanks and underscores ("distCoeffs" for
   /// "dist_coeffs"); the first of `names` where there is none.

@@ -110,7 +110,7 @@ std::optional<PoseColumns> columns_named(const Fields& parts) {
   for (const std::string_view part : parts) names.push_back(plain(part));
   PoseColumns columns;
   const auto position =
-      find_group<3>(names, "xyz", {"t", "", "p", "prs", "position", "pos", "translation", "pose"});
+      find_group<3>(names, "xyz", {"t", "", "p", "prsr", "position", "pos", "translation", "pose"});
   auto xyzw =
       find_group<4>(names, "xyzw", {"q", "qrs", "orientation", "rot", "rotation", "quaternion", "quat"});
   if (!xyzw[0]) xyzw = find_group<4>(names, "1230", {"q"});  // PX4
