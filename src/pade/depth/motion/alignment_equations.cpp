@@ -91,13 +91,22 @@ std::vector<Seen> see(const Camera& camera, const cv::Mat& image, int level,
   return all;
 }
 
-double noise_of(const std::vector<Seen>& all, const std::vector<MotionAligner::Point>& points) {
+float median(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void measure(const std::vector<Seen>& all, const std::vector<MotionAligner::Point>& points,
+             AlignmentSums& sums) {
   std::vector<float> sizes;
   sizes.reserve(all.size());
   for (const Seen& seen : all) sizes.push_back(std::abs(seen.grey - points[seen.point].grey));
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return std::max(kLeastNoise, kMedianToSigma * static_cast<double>(*middle));
+  sums.noise = std::max(kLeastNoise, kMedianToSigma * static_cast<double>(median(sizes)));
+  for (std::size_t i = 0; i < all.size(); ++i) sizes[i] = points[all[i].point].grey;
+  const float typical = median(sizes);
+  for (float& size : sizes) size = std::abs(size - typical);
+  sums.contrast = kMedianToSigma * static_cast<double>(median(sizes));
 }
 
 }  // namespace
@@ -147,7 +156,8 @@ AlignmentSums alignment_sums(const Camera& camera, const cv::Mat& image, int lev
   const std::vector<Seen> all = see(camera, image, level, points, at);
   sums.used = static_cast<int>(all.size());
   if (sums.used < kFewest) return sums;
-  const double noise = noise_of(all, points);
+  measure(all, points, sums);
+  const double noise = sums.noise;
   for (const Seen& seen : all) {
     const MotionAligner::Point& point = points[seen.point];
     Vector8d j;

@@ -56,6 +56,8 @@ struct AlignmentSums {
   NormalEquations views;  ///< against those before
   int used = 0;           ///< points in view
   int inliers = 0;        ///< of them: agree with the last frame
+  double noise = 0;       ///< of the residuals, robust standard deviation, grey values
+  double contrast = 0;    ///< that of the points' greys
 };
 
 /// @param camera  of the full image. @param image  newest frame at `level`. @param points, glimpses  of

@@ -42,6 +42,9 @@ Eigen::VectorXd grown(const Eigen::VectorXd& v, double value) {
 }  // namespace
 
 void BaselineWindow::drop_oldest() {
+  constexpr double kMemory = 0.98;
+  past_scatter_ = kMemory * (past_scatter_ + std::pow(given_[0] - x_[0], 2) / variances_[0]);
+  past_steps_ = kMemory * (past_steps_ + 1);
   const Eigen::Index n = x_.size() - 1;
   const Eigen::VectorXd share = information_.col(0).tail(n) / information_(0, 0);
   right_ = Eigen::VectorXd(right_.tail(n) - share * right_[0]);
@@ -82,9 +85,10 @@ double BaselineWindow::length() const { return std::exp(x_[x_.size() - 1]); }
 double BaselineWindow::variance() const {
   const auto n = static_cast<double>(x_.size());
   const double stated = n / variances_.cwiseInverse().sum();
-  const double scatter =
-      std::min(1.0, ((given_ - x_).cwiseAbs2().array() / variances_.array()).sum() / n);  // of what is stated
-  return stated * (1 - scatter + scatter / n);
+  const double scatter = ((given_ - x_).cwiseAbs2().array() / variances_.array()).sum() + past_scatter_;
+  const double free = std::max(1.0, n - 1) + past_steps_;
+  const double own = std::min(1.0, scatter / free);  // share of the variance that is each step's own
+  return stated * (1 - own + own / n);
 }
 
 }  // namespace pade::depth

@@ -52,6 +52,8 @@ class BaselineWindow {
   Eigen::VectorXd right_;        // information * x
   Eigen::VectorXd given_;        // log g
   Eigen::VectorXd variances_;    // r
+  double past_scatter_ = 0;      // sum of (log g - x)^2 / r of the steps that have left, fading
+  double past_steps_ = 0;        // their number, fading
 };
 
 }  // namespace pade::depth

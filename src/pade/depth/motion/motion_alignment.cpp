@@ -14,10 +14,13 @@
 namespace pade::depth {
 namespace {
 
-constexpr int kCell = 6;          // px: each cell gives its best pixel
+constexpr int kLargestCell = 8;  // px: each cell gives its best pixel
+constexpr int kSmallestCell = 3;
+constexpr double kPoints = 1200;  // cells at least, if they are not too small
 constexpr int kFewest = 100;      // points
 constexpr float kLeastSlope = 3;  // grey values per px
 constexpr double kLeastInliers = 0.4;
+constexpr double kMostNoise = 0.5;      // of the contrast: what differs more has not been found again
 constexpr double kSurprise = 40;        // chi-square of 6 degrees of freedom beyond 1 - 1e-6
 constexpr double kExposureGain = 0.3;   // from frame to frame
 constexpr double kExposureOffset = 40;  // grey values
@@ -174,21 +177,23 @@ void MotionAligner::select(const AlignmentInput& input, int level) {
   const Camera& camera = input.camera;
   const cv::Mat& last = last_[static_cast<std::size_t>(level)];
   const int step = 1 << level;
-  const int rows = last.rows / kCell;
-  const int columns = last.cols / kCell;
+  const double wanted = std::sqrt(static_cast<double>(last.total()) / kPoints);
+  const int cell = std::clamp(static_cast<int>(wanted), kSmallestCell, kLargestCell);
+  const int rows = last.rows / cell;
+  const int columns = last.cols / cell;
   const auto most = static_cast<float>(options_.relative_sigma);
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       Point best{};
       float best_slope = kLeastSlope * kLeastSlope;
-      for (int v = std::max(1, row * kCell); v < std::min(last.rows - 1, (row + 1) * kCell); ++v) {
+      for (int v = std::max(1, row * cell); v < std::min(last.rows - 1, (row + 1) * cell); ++v) {
         const auto* above = last.ptr<std::uint8_t>(v - 1);
         const auto* line = last.ptr<std::uint8_t>(v);
         const auto* below = last.ptr<std::uint8_t>(v + 1);
         const int full_v = std::min(v * step, camera.height - 1);
         const auto* depth = input.depth.depth.ptr<float>(full_v);
         const auto* variance = input.depth.variance.ptr<float>(full_v);
-        for (int u = std::max(1, column * kCell); u < std::min(last.cols - 1, (column + 1) * kCell); ++u) {
+        for (int u = std::max(1, column * cell); u < std::min(last.cols - 1, (column + 1) * cell); ++u) {
           const float gx = 0.5F * static_cast<float>(line[u + 1] - line[u - 1]);
           const float gy = 0.5F * static_cast<float>(below[u] - above[u]);
           const float slope = gx * gx + gy * gy;
@@ -273,7 +278,7 @@ AlignedMotion MotionAligner::align(const AlignmentInput& input) {
     for (int iteration = 0; iteration < options_.iterations; ++iteration) {
       sums = alignment_sums(input.camera, newest_[static_cast<std::size_t>(level)], level, points_, glimpses_,
                             state);
-      if (sums.used < kFewest || sums.inliers < kFewest) return out;
+      if (sums.used < kFewest || sums.inliers < kFewest) break;
       last = equations(sums, !glimpses_.empty(), state, input.prior, prior_information, options_);
       const Vector8d step = -last.information.ldlt().solve(last.gradient);
       if (!step.allFinite()) return out;
@@ -281,11 +286,14 @@ AlignedMotion MotionAligner::align(const AlignmentInput& input) {
       if (is_settled(step, state.t)) break;
     }
   }
+  if (sums.used < kFewest || sums.inliers < kFewest) return out;
   out.pixels = sums.used;
   out.inlier_share = static_cast<double>(sums.inliers) / sums.used;
   const Vector6d moved = difference(state, input.prior);
   out.surprise = moved.dot(prior_information * moved);
-  if (!(out.inlier_share >= kLeastInliers) || !(out.surprise <= kSurprise)) return out;
+  if (!(sums.noise < kMostNoise * sums.contrast) || !(out.inlier_share >= kLeastInliers) ||
+      !(out.surprise <= kSurprise))
+    return out;
   out.aligned = true;
   out.motion.t_reference_other = state.t;
   out.motion.R_reference_other = state.R;
