@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/depth/derotation.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/mapping/occupancy_map.hpp"
@@ -35,13 +36,6 @@ double time_of(const Work& work) {
   const double start = thread_milliseconds();
   work();
   return thread_milliseconds() - start;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// The steps of one job on its pairs, each with its times.
