@@ -131,6 +131,20 @@ TEST(InitialFlow, IsTakenUpAlikeByAnyNumberOfThreads) {
   }
 }
 
+TEST(InitialFlow, IsTurnedAroundOnTheWayBack) {
+  // Too far for the finest level alone: both ways must begin where they are told to.
+  const cv::Vec2f shift(-19, 7);
+  const testing::ShiftedPair pair = testing::shifted_pair({160, 120}, cv::Point2d(shift[0], shift[1]));
+  FlowOptions options = taken_up(InitialFlow::replaces, 0);
+  options.confidence = FlowConfidence::forward_backward;
+  const cv::Mat initial(pair.first.size(), CV_32FC2, cv::Scalar(shift[0], shift[1]));
+  for (const char* name : {"lucas-kanade", "clg-fast"}) {
+    const FlowField field = flow_of(name, options, pair.first, pair.second, initial);
+    const cv::Rect inside(50, 30, 70, 60);
+    EXPECT_LT(cv::mean(field.sigma(inside))[0], 0.2) << name;
+  }
+}
+
 TEST(InitialFlow, OfTheCoarsestLevelHasNothingToCompeteWith) {
   // As the only start of the search it is used as it is: a shift that the pyramid cannot find.
   const cv::Point2d shift(70, -55);
