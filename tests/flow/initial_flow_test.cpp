@@ -131,6 +131,22 @@ TEST(InitialFlow, IsTakenUpAlikeByAnyNumberOfThreads) {
   }
 }
 
+TEST(InitialFlow, ThatDoesNotFitTheImagesIsNone) {
+  const testing::ShiftedPair pair = testing::shifted_pair({160, 120}, {2, 1});
+  const FlowOptions options = taken_up(InitialFlow::replaces, 0);
+  for (const char* name : {"lucas-kanade", "farneback", "clg-fast"}) {
+    const cv::Mat without = flow_of(name, options, pair.first, pair.second, {}).vectors;
+    for (const cv::Mat& initial :
+         {cv::Mat(30, 40, CV_32FC2, cv::Scalar(9, 9)), cv::Mat(120, 161, CV_32FC2, cv::Scalar(9, 9)),
+          cv::Mat(pair.first.size(), CV_64FC2, cv::Scalar(9, 9)),
+          cv::Mat(pair.first.size(), CV_32FC1, cv::Scalar(9))}) {
+      const cv::Mat with = flow_of(name, options, pair.first, pair.second, initial).vectors;
+      EXPECT_EQ(cv::norm(with, without, cv::NORM_INF), 0)
+          << name << " " << initial.size() << " " << initial.type();
+    }
+  }
+}
+
 TEST(InitialFlow, IsTurnedAroundOnTheWayBack) {
   // Too far for the finest level alone: both ways must begin where they are told to.
   const cv::Vec2f shift(-19, 7);

@@ -116,6 +116,12 @@ template <KernelDerotation kDerotation>
   return {d, match};
 }
 
+/// `yes` where all bits of `mask` are set, `no` where none is.
+[[gnu::always_inline]] inline float chosen(std::int32_t mask, float yes, float no) {
+  return __builtin_bit_cast(
+      float, (__builtin_bit_cast(std::int32_t, yes) & mask) | (__builtin_bit_cast(std::int32_t, no) & ~mask));
+}
+
 /// What a pixel is judged by.
 struct Evidence {
   float z, aa, ad, sigma2;
@@ -158,13 +164,20 @@ struct Evidence {
   return bounded ? nothing_before : __builtin_nanf("");
 }
 
-template <KernelDerotation kDerotation, bool kSamelson, bool kSigma, bool kPose>
+/// Only what decides most of the work is a constant; what chooses between two numbers costs nothing in the
+/// loop.
+template <KernelDerotation kDerotation, bool kPose>
 void row(const KernelParameters& parameters, const float* __restrict x_of, const float y,
-         const float* __restrict flow, const float* __restrict sigma, const std::uint8_t* __restrict gate,
+         const float* __restrict flow, const float* __restrict sigma_of, const std::uint8_t* __restrict gate,
          std::size_t count, float* __restrict depth, float* __restrict variance,
          float* __restrict own_variance, float* __restrict bounds, std::uint8_t* __restrict state) {
   const KernelParameters k = parameters;  // a copy that no store through the outputs can change
   const float nan = __builtin_nanf("");
+  // Conditions in the loop would keep it from being vectorised: numbers and bits choose instead.
+  const float* const sigma = sigma_of != nullptr ? sigma_of : x_of;  // in place of none any finite numbers
+  const float scale2 = sigma_of != nullptr ? k.sigma_scale2 : 0.0F;
+  const float constant2 = sigma_of != nullptr ? 0.0F : k.sigma2;
+  const std::int32_t samelson = k.samelson ? -1 : 0;
 #pragma GCC ivdep  // five outputs and four inputs: more than the compiler would check for overlap
   for (std::size_t i = 0; i < count; ++i) {
     const float x = x_of[i];
@@ -179,8 +192,8 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
     const float ad = ax * d.x + ay * d.y;
     const float across = ax * d.y - ay * d.x;
     const float d2 = d.x * d.x + d.y * d.y;
-    const float s = kSamelson ? ad / d2 : aa / ad;
-    const float sigma2 = (kSigma ? k.sigma_scale2 * sigma[i] * sigma[i] : k.sigma2) + k.relative2 * d2;
+    const float s = chosen(samelson, ad, aa) / chosen(samelson, d2, ad);
+    const float sigma2 = (scale2 * sigma[i] * sigma[i] + constant2) + k.relative2 * d2;
     const float ad2 = ad * ad;
     const float noise = sigma2 * aa;
     const bool inside =
@@ -214,16 +227,9 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
   }
 }
 
-template <KernelDerotation kDerotation, bool kSamelson, class... Rest>
-void choose(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
-            const Rest&... rest) {
-  if (sigma != nullptr) {
-    k.has_pose ? row<kDerotation, kSamelson, true, true>(k, x, y, flow, sigma, rest...)
-               : row<kDerotation, kSamelson, true, false>(k, x, y, flow, sigma, rest...);
-  } else {
-    k.has_pose ? row<kDerotation, kSamelson, false, true>(k, x, y, flow, sigma, rest...)
-               : row<kDerotation, kSamelson, false, false>(k, x, y, flow, sigma, rest...);
-  }
+template <KernelDerotation kDerotation, class... Rest>
+void choose(const KernelParameters& k, const Rest&... rest) {
+  k.has_pose ? row<kDerotation, true>(k, rest...) : row<kDerotation, false>(k, rest...);
 }
 
 /// kN > 0: a constant number of neighbours, which vectorises.
@@ -238,28 +244,23 @@ void sum_whole_windows(const float* __restrict in, std::size_t windows, int n, f
   }
 }
 
-template <KernelDerotation kDerotation, class... Rest>
-void choose_reading(const KernelParameters& k, const Rest&... rest) {
-  k.samelson ? choose<kDerotation, true>(k, rest...) : choose<kDerotation, false>(k, rest...);
-}
-
 }  // namespace
 
 void depth_row(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
                const std::uint8_t* gate, std::size_t count, const DepthRow& out) {
   switch (k.derotation) {
     case KernelDerotation::none:
-      return choose_reading<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, out.depth,
-                                                    out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                            out.own_variance, out.bound, out.state);
     case KernelDerotation::exact:
-      return choose_reading<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, out.depth,
-                                                     out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                             out.own_variance, out.bound, out.state);
     case KernelDerotation::first_order:
-      return choose_reading<KernelDerotation::first_order>(
-          k, x, y, flow, sigma, gate, count, out.depth, out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::first_order>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                                   out.own_variance, out.bound, out.state);
     case KernelDerotation::remaining:
-      return choose_reading<KernelDerotation::remaining>(
-          k, x, y, flow, sigma, gate, count, out.depth, out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::remaining>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                                 out.own_variance, out.bound, out.state);
   }
 }
 
