@@ -9,6 +9,8 @@
 #include "pade/core/depth_image.hpp"
 #include "pade/core/random.hpp"
 
+#include "support/guarded_image.hpp"
+
 namespace pade::depth {
 namespace {
 
@@ -163,6 +165,17 @@ TEST(ImageNoise, IsNotChangedByExposureOrByTextureThatTheFlowMatches) {
   const cv::Mat first = noisy(texture, 2, 1);
   const cv::Mat second = noisy(texture, 2, 2) + 9;
   EXPECT_NEAR(image_noise(first, second, kStill), 2, 0.5);
+}
+
+TEST(ImageNoise, ReadsNothingBehindTheImages) {
+  const cv::Size size(35, 27);  // rows and columns that are looked at reach the last but one
+  const cv::Mat image = noisy(cv::Mat(size, CV_8UC1, cv::Scalar(120)), 3, 1);
+  const test::GuardedImage first(image);
+  const test::GuardedImage second(image);
+  for (const cv::Vec2f to : {cv::Vec2f(0, 0), cv::Vec2f(1, 0), cv::Vec2f(0, 1), cv::Vec2f(1, 1)}) {
+    const FlowField flow{cv::Mat(size, CV_32FC2, cv::Scalar(to[0], to[1])), {}};
+    EXPECT_GT(image_noise(first.get(), second.get(), flow), 0) << to;
+  }
 }
 
 TEST(ImageNoise, OfFlowThatMatchesNothingIsTheLeastNoise) {
