@@ -20,8 +20,7 @@ namespace {
 
 constexpr double kAligned = 0.9998;  // cosine of about a degree
 
-// Three axes of the views: two horizontal ones and up, right-handed, with their names.
-struct Axes {
+struct Axes {  // of the views: two horizontal ones and up, right-handed, with their names
   std::array<Eigen::Vector3d, 3> direction;
   std::array<std::string, 3> name;
 };
