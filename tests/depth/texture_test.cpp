@@ -172,7 +172,7 @@ TEST(ImageNoise, ReadsNothingBehindTheImages) {
   const cv::Mat image = noisy(cv::Mat(size, CV_8UC1, cv::Scalar(120)), 3, 1);
   const test::GuardedImage first(image);
   const test::GuardedImage second(image);
-  for (const cv::Vec2f to : {cv::Vec2f(0, 0), cv::Vec2f(1, 0), cv::Vec2f(0, 1), cv::Vec2f(1, 1)}) {
+  for (const cv::Vec2f& to : {cv::Vec2f(0, 0), cv::Vec2f(1, 0), cv::Vec2f(0, 1), cv::Vec2f(1, 1)}) {
     const FlowField flow{cv::Mat(size, CV_32FC2, cv::Scalar(to[0], to[1])), {}};
     EXPECT_GT(image_noise(first.get(), second.get(), flow), 0) << to;
   }
