@@ -79,10 +79,11 @@ class Clock {
 
   [[nodiscard]] JobTimes times() const {
     JobTimes times;
-    if (!derotate_.empty()) times.derotate = median(derotate_);
-    times.flow = median(flow_times_);
-    for (std::size_t c = 0; c < depth_.size(); ++c) times.depth[job_.cells[c].name] = median(depth_[c]);
-    if (maps()) times.map = median(map_times_);
+    if (!derotate_.empty()) times.derotate = median(std::vector<double>(derotate_));
+    times.flow = median(std::vector<double>(flow_times_));
+    for (std::size_t c = 0; c < depth_.size(); ++c)
+      times.depth[job_.cells[c].name] = median(std::vector<double>(depth_[c]));
+    if (maps()) times.map = median(std::vector<double>(map_times_));
     return times;
   }
 

@@ -6,6 +6,9 @@
 namespace pade::simulation::PADE_ISA {
 namespace {
 
+using simd::PADE_ISA::least;
+using simd::PADE_ISA::select;
+
 /// Enters what lies before all else in the lanes of `nearer`, from `pixel` on.
 PADE_INLINE void keep_nearer(const RasterTile& tile, int pixel, I nearer, V w, V before, int slot) {
   I slots;

@@ -15,7 +15,20 @@
 
 namespace pade::simulation::PADE_ISA {
 
-using namespace simd::PADE_ISA;  // NOLINT(google-build-using-namespace): the vocabulary of every kernel
+using simd::PADE_ISA::abs;
+using simd::PADE_ISA::bits;
+using simd::PADE_ISA::gather;
+using simd::PADE_ISA::I;
+using simd::PADE_ISA::kLanes;
+using simd::PADE_ISA::load;
+using simd::PADE_ISA::max;
+using simd::PADE_ISA::min;
+using simd::PADE_ISA::set;
+using simd::PADE_ISA::store;
+using simd::PADE_ISA::to_float;
+using simd::PADE_ISA::truncate;
+using simd::PADE_ISA::V;
+
 constexpr int kParts = raster_lanes / kLanes;  // vectors per block and per packet
 
 struct Vec3 {
