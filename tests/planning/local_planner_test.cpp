@@ -52,7 +52,7 @@ LocalPlanner planner_of(const LocalPlannerOptions& options = {}) {
 LocalWindow unseen_window(const Vector3d& centre) {
   LocalWindow window({4, 4, 1});
   const auto map = mapping::OccupancyMap::create();
-  window.set(*map, centre, 0.4);
+  window.set(*mapping::MapView::of(*map), centre, 0.4);
   return window;
 }
 

@@ -1,5 +1,6 @@
 #include "pade/planning/local_window.hpp"
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -61,7 +62,7 @@ Touched touched(const mapping::OccupancyMap& map, const Vector3d& p, double radi
 TEST(LocalWindow, ABallThatItCallsFreeTouchesNothingElse) {
   const mapping::OccupancyMap map = random_map(4, 0.0008);
   LocalWindow window({2, 2, 1});
-  window.set(map, {0.03, -0.02, 1.5}, 0.4);
+  window.set(*mapping::MapView::of(map), {0.03, -0.02, 1.5}, 0.4);
   std::mt19937 engine(9);
   std::uniform_real_distribution<double> number(-1.4, 1.4);
   int free = 0;
@@ -85,11 +86,11 @@ TEST(LocalWindow, ABallThatItCallsFreeTouchesNothingElse) {
 TEST(LocalWindow, KnowsNothingBeyondItselfAndWhatItIsTold) {
   const auto map = mapping::OccupancyMap::create();
   LocalWindow window({2, 2, 1});
-  window.set(*map, {0, 0, 1}, 0.3);
+  window.set(*mapping::MapView::of(*map), {0, 0, 1}, 0.3);
   EXPECT_FALSE(window.is_free({0, 0, 1}));
   EXPECT_TRUE(window.is_clear({0, 0, 1}));
-  const std::vector<KnownBall> known = {{{0, 0, 1}, 0.8}};
-  window.set(*map, {0, 0, 1}, 0.3, known);
+  const std::array place = {Vector3d(0, 0, 1)};
+  window.set(*mapping::MapView::of(*map)->flown(place, 0.8), {0, 0, 1}, 0.3);
   EXPECT_TRUE(window.is_free({0, 0, 1}));
   EXPECT_TRUE(window.is_free({0.2, 0, 1}));
   EXPECT_FALSE(window.is_free({0.6, 0, 1}));
@@ -108,12 +109,12 @@ TEST(LocalGuide, LeadsStraightWhereNothingStandsAndAroundAWall) {
   LocalGuide guide;
   const LocalGuide::Heights heights{0.7, 2.8};
   const Vector3d goal(10, 0, 1.6);
-  window.set(*empty, {0, 0, 1.6}, 0.4);
+  window.set(*mapping::MapView::of(*empty), {0, 0, 1.6}, 0.4);
   guide.set(window, goal, heights);
   EXPECT_NEAR(guide.to_go({0, 0, 1.6}), 4 * 1.5 + 6, 0.7);  // unseen up to the edge
   EXPECT_LT(guide.to_go({1, 0, 1.6}), guide.to_go({0, 0, 1.6}));
   EXPECT_EQ(guide.to_go({20, 0, 1.6}), std::numeric_limits<double>::infinity());
-  window.set(*walled, {0, 0, 1.6}, 0.4);
+  window.set(*mapping::MapView::of(*walled), {0, 0, 1.6}, 0.4);
   guide.set(window, goal, heights);
   EXPECT_LT(guide.to_go({0.3, 1, 1.6}), guide.to_go({0.3, 0, 1.6}));  // the end of the wall is at y = 1.5 m
   EXPECT_GT(guide.to_go({0, 0, 1.6}), 4 * 1.5 + 6 + 0.5);

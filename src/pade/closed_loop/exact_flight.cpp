@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <memory>
 
 #include "pade/core/option_check.hpp"
+#include "pade/mapping/query/map_view.hpp"
 #include "pade/planning/local_window.hpp"
+#include "pade/planning/map_space.hpp"
 #include "pade/simulation/render/truth.hpp"
 
 namespace pade::closed_loop {
@@ -18,6 +20,7 @@ constexpr double kSampleRate = 100;  // Hz, of the look at the true surface
 constexpr double kFarthest = 2;      // clearances are measured up to here, m
 constexpr double kStanding = 0.05;   // m/s
 constexpr double kMoving = 0.3;      // m/s
+constexpr double kNearStart = 10;    // farther away no plan looks at the place of take-off, m
 
 Camera camera_of(int width) {
   Camera camera;
@@ -54,31 +57,6 @@ DepthImage depth_image(const cv::Mat& exact, double time) {
   return image;
 }
 
-/// The window as the planner's space: a ball fits wherever in its voxel the centre is.
-class WindowSpace : public planning::FreeSpace {
- public:
-  explicit WindowSpace(const planning::LocalWindow& window) : window_(window) {}
-  [[nodiscard]] double clear_length(std::span<const Vector3d> path, double /*radius*/,
-                                    bool unknown_is_free) const override {
-    const auto fits = [&](const Vector3d& p) {
-      return unknown_is_free ? window_.is_clear(p) : window_.is_free(p);
-    };
-    double length = 0;
-    for (std::size_t i = 0; i + 1 < path.size(); ++i) {
-      const Vector3d way = path[i + 1] - path[i];
-      const double all = way.norm();
-      for (double at = 0; at < all; at += 0.5 * window_.voxel()) {
-        if (!fits(path[i] + at / all * way)) return length + at;
-      }
-      length += all;
-    }
-    return fits(path.back()) ? std::numeric_limits<double>::infinity() : length;
-  }
-
- private:
-  const planning::LocalWindow& window_;
-};
-
 /// One flight while it goes on.
 class Loop {
  public:
@@ -88,6 +66,7 @@ class Loop {
         options_(options),
         planner_(std::move(planner)),
         map_(std::move(map)),
+        view_(mapping::MapView::of(map_)),
         camera_(camera_of(options.width)),
         grid_(camera_) {
     const Vector3d way = task.goal - task.start;
@@ -109,6 +88,7 @@ class Loop {
   const ExactFlightOptions& options_;
   planning::LocalPlanner planner_;
   mapping::OccupancyMap map_;
+  std::shared_ptr<const mapping::MapView> view_;
   planning::LocalWindow window_;
   Camera camera_;
   simulation::RayGrid grid_;
@@ -119,14 +99,20 @@ class Loop {
 
 void Loop::see(double time) {
   const Pose pose = camera_at(planning::state_at(motion_, time));
-  map_.integrate(depth_image(simulation::exact_depth(task_.scene, grid_, pose), time), camera_, pose);
+  const mapping::MapChange change =
+      map_.integrate(depth_image(simulation::exact_depth(task_.scene, grid_, pose), time), camera_, pose);
+  view_ = view_->after(map_, change);
 }
 
 std::vector<MotionState> Loop::decide(double time, double effect) {
   const MotionState then = planning::state_at(motion_, effect);
-  const std::array known = {planning::KnownBall{task_.start, options_.known_start}};
-  window_.set(map_, then.position, planner_.radius(0), known);
-  const planning::LocalPlan& plan = planner_.plan(then, task_.goal, WindowSpace(window_), window_);
+  const std::array start = {task_.start};
+  const bool near_start = (then.position - task_.start).norm() < options_.known_start + kNearStart;
+  const auto known =
+      near_start && options_.known_start > 0 ? view_->flown(start, options_.known_start) : view_;
+  window_.set(*known, then.position, planner_.radius(0));
+  const planning::MapSpace space(known);
+  const planning::LocalPlan& plan = planner_.plan(then, task_.goal, space, window_);
   record_.plans.push_back({time, plan.kind, plan.speed_limit, plan.free_reach, plan.valid});
   return plan.motion;
 }
@@ -186,7 +172,7 @@ FlightRecord Loop::run() {
 
 mapping::MapOptions ExactFlightOptions::exact_map() {
   mapping::MapOptions map;
-  map.range = 12;
+  map.range = 8;
   map.looks_baseline = 0;
   map.hit_near = map.range;
   return map;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <octomap/OcTree.h>
+#include "pade/mapping/query/tile_tree.hpp"
 
 namespace pade::planning {
 namespace {
@@ -11,14 +11,17 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 constexpr int kWordBits = 64;
-constexpr int kTreeCentre = 32768;  // key of the voxel just above the origin
+constexpr int kTile = mapping::kTileSide;
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
 }  // namespace
 
 void LocalWindow::resize(const Vector3d& centre) {
-  first_ = ((centre - half_size_) / voxel_).array().floor().cast<int>();
-  size_ = (2 * half_size_ / voxel_).array().round().cast<int>();
+  // Whole tiles.
+  const Vector3i first_tile = ((centre - half_size_) / (kTile * voxel_)).array().floor().cast<int>();
+  const Vector3i end_tile = ((centre + half_size_) / (kTile * voxel_)).array().ceil().cast<int>();
+  first_ = kTile * first_tile;
+  size_ = kTile * (end_tile - first_tile);
   words_ = (size_.x() + kWordBits - 1) / kWordBits;
   const auto words = row(0, size_.z());
   free_.assign(words, 0);
@@ -28,51 +31,35 @@ void LocalWindow::resize(const Vector3d& centre) {
   unfree_near_.resize(words);
 }
 
-void LocalWindow::fill(Bits& bits, const Vector3i& low, int side) const {
-  const Vector3i from = low.cwiseMax(0);
-  const Vector3i to = (low + Vector3i::Constant(side)).cwiseMin(size_);
-  if ((from.array() >= to.array()).any()) return;
-  for (int z = from.z(); z < to.z(); ++z) {
-    for (int y = from.y(); y < to.y(); ++y) {
-      const std::size_t start = row(y, z);
-      for (int word = from.x() / kWordBits; word <= (to.x() - 1) / kWordBits; ++word) {
-        const int left = std::max(from.x() - word * kWordBits, 0);
-        const int right = std::min(to.x() - word * kWordBits, kWordBits);
-        bits[start + static_cast<std::size_t>(word)] |= (kAll << left) & (kAll >> (kWordBits - right));
+void LocalWindow::take(const mapping::MapView& map) {
+  const mapping::TileTree& tiles = map.tiles();
+  const Vector3i first_tile = (first_.array() + mapping::kVoxelsPerAxis / 2) / kTile;
+  const Vector3i tiles_of_box = size_ / kTile;
+  const auto is_addressed = [](int tile) { return tile >= 0 && tile < mapping::kTilesPerAxis; };
+  for (int tz = 0; tz < tiles_of_box.z(); ++tz) {
+    for (int ty = 0; ty < tiles_of_box.y(); ++ty) {
+      for (int tx = 0; tx < tiles_of_box.x(); ++tx) {
+        const Vector3i at = first_tile + Vector3i(tx, ty, tz);
+        if (!is_addressed(at.x()) || !is_addressed(at.y()) || !is_addressed(at.z())) continue;
+        copy(tiles.tile(at.x(), at.y(), at.z()), kTile * Vector3i(tx, ty, tz));
       }
     }
   }
 }
 
-void LocalWindow::take(const mapping::OccupancyMap& map) {
-  const octomap::OcTree& tree = map.tree();
-  const auto key = [&](const Vector3i& index) {
-    const Vector3i k = (index.array() + kTreeCentre).cwiseMax(0).cwiseMin(2 * kTreeCentre - 1);
-    return octomap::OcTreeKey(static_cast<octomap::key_type>(k.x()), static_cast<octomap::key_type>(k.y()),
-                              static_cast<octomap::key_type>(k.z()));
-  };
-  const octomap::OcTreeKey low = key(first_);
-  const octomap::OcTreeKey high = key(first_ + size_ - Vector3i::Ones());
-  for (auto leaf = tree.begin_leafs_bbx(low, high), end = tree.end_leafs_bbx(); leaf != end; ++leaf) {
-    const int side = 1 << (mapping::kTreeDepth - leaf.getDepth());
-    const octomap::OcTreeKey& at = leaf.getKey();
-    const Vector3i corner(at[0] & ~(side - 1), at[1] & ~(side - 1), at[2] & ~(side - 1));
-    fill(tree.isNodeOccupied(*leaf) ? occupied_ : free_, corner - first_ - Vector3i::Constant(kTreeCentre),
-         side);
-  }
-}
-
-/// Voxels whose centre lies in the ball.
-void LocalWindow::take(const KnownBall& ball) {
-  const Vector3i low = ((ball.centre - Vector3d::Constant(ball.radius)) / voxel_).array().floor().cast<int>();
-  const int side = static_cast<int>(2 * ball.radius / voxel_) + 2;
-  for (int z = 0; z < side; ++z) {
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < side; ++x) {
-        const Vector3i voxel = low + Vector3i(x, y, z);
-        const Vector3d centre = voxel_ * (voxel.cast<double>() + Vector3d::Constant(0.5));
-        if ((centre - ball.centre).norm() <= ball.radius) fill(free_, voxel - first_, 1);
-      }
+/// A tile has a byte for each of its rows along x.
+void LocalWindow::copy(const mapping::Tile& tile, const Vector3i& corner) {
+  constexpr std::uint64_t kByte = 255;
+  const auto word = static_cast<std::size_t>(corner.x() / kWordBits);
+  const int shift = corner.x() % kWordBits;
+  for (int z = 0; z < kTile; ++z) {
+    const auto slice = static_cast<std::size_t>(z);
+    for (int y = 0; y < kTile; ++y) {
+      const std::size_t to = row(corner.y() + y, corner.z() + z) + word;
+      const std::uint64_t occupied = tile.occupied[slice] >> (kTile * y) & kByte;
+      const std::uint64_t known = tile.known[slice] >> (kTile * y) & kByte;
+      occupied_[to] |= occupied << shift;
+      free_[to] |= (known & ~occupied) << shift;
     }
   }
 }
@@ -124,13 +111,11 @@ void LocalWindow::spread(const Bits& from, double radius, bool beyond, Bits& to)
   }
 }
 
-void LocalWindow::set(const mapping::OccupancyMap& map, const Vector3d& centre, double radius,
-                      std::span<const KnownBall> known) {
-  voxel_ = map.options().voxel;
+void LocalWindow::set(const mapping::MapView& map, const Vector3d& centre, double radius) {
+  voxel_ = map.voxel();
   resize(centre);
   take(map);
-  for (const KnownBall& ball : known) take(ball);
-  for (std::size_t i = 0; i < free_.size(); ++i) unfree_[i] = ~free_[i] | occupied_[i];
+  for (std::size_t i = 0; i < free_.size(); ++i) unfree_[i] = ~free_[i];
   spread(occupied_, radius, false, occupied_near_);
   spread(unfree_, radius, true, unfree_near_);
 }

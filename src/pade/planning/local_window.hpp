@@ -3,32 +3,27 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "pade/mapping/occupancy_map.hpp"
+#include "pade/mapping/query/map_view.hpp"
+
+namespace pade::mapping {
+struct Tile;
+}
 
 namespace pade::planning {
-
-/// Space that is known to be free although no camera has seen it, unless something in it is seen: the place
-/// of take-off.
-struct KnownBall {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< world, m
-  double radius = 0;                                 ///< m
-};
 
 /// A box of voxels that follows the vehicle. Buffers are kept from call to call.
 class LocalWindow {
  public:
-  /// Half the size of the box, m.
-  explicit LocalWindow(const Eigen::Vector3d& half_size = {8, 8, 1.6}) : half_size_(half_size) {}
+  /// Half the size of the box, m; the box is that or up to a tile of 8 voxels more to a side.
+  explicit LocalWindow(const Eigen::Vector3d& half_size = {6.4, 6.4, 1.6}) : half_size_(half_size) {}
 
   /// Takes the map about `centre`, and finds where a ball of `radius` (m) fits: wherever in the voxel its
   /// centre is. What lies beyond the box is unknown.
-  void set(const mapping::OccupancyMap& map, const Eigen::Vector3d& centre, double radius,
-           std::span<const KnownBall> known = {});
+  void set(const mapping::MapView& map, const Eigen::Vector3d& centre, double radius);
 
   /// Whether a ball about this point (world, m) touches nothing that is known to be occupied.
   [[nodiscard]] bool is_clear(const Eigen::Vector3d& point) const {
@@ -48,9 +43,8 @@ class LocalWindow {
  private:
   using Bits = std::vector<std::uint64_t>;  // rows along x, of words_ words; then y, then z
   void resize(const Eigen::Vector3d& centre);
-  void take(const mapping::OccupancyMap& map);
-  void take(const KnownBall& ball);
-  void fill(Bits& bits, const Eigen::Vector3i& low, int side) const;
+  void take(const mapping::MapView& map);
+  void copy(const mapping::Tile& tile, const Eigen::Vector3i& corner);
   void spread(const Bits& from, double radius, bool beyond, Bits& to);
   void spread_rows(const Bits& from, int reach, bool beyond);
   [[nodiscard]] std::size_t row(int y, int z) const {
