@@ -16,6 +16,11 @@ namespace {
 using Eigen::Vector3d;
 using mapping::Occupancy;
 
+octomap::point3d voxel(int x, int y, int z) {
+  const auto centre = [](int index) { return static_cast<float>(0.1 * index + 0.05); };
+  return {centre(x), centre(y), centre(z)};
+}
+
 /// Free about the origin, with holes of unknown space and occupied voxels at random.
 mapping::OccupancyMap random_map(unsigned seed, double occupied) {
   auto tree = std::make_unique<octomap::OcTree>(0.1);
@@ -26,9 +31,9 @@ mapping::OccupancyMap random_map(unsigned seed, double occupied) {
       for (int z = 0; z < 30; ++z) {
         const double chance = number(engine);
         if (chance < occupied) {
-          tree->updateNode(octomap::point3d(0.1F * x + 0.05F, 0.1F * y + 0.05F, 0.1F * z + 0.05F), true);
+          tree->updateNode(voxel(x, y, z), true);
         } else if (chance > 2 * occupied) {
-          tree->updateNode(octomap::point3d(0.1F * x + 0.05F, 0.1F * y + 0.05F, 0.1F * z + 0.05F), false);
+          tree->updateNode(voxel(x, y, z), false);
         }
       }
     }
@@ -67,19 +72,19 @@ TEST(LocalWindow, ABallThatItCallsFreeTouchesNothingElse) {
   std::uniform_real_distribution<double> number(-1.4, 1.4);
   int free = 0;
   int missed = 0;
-  for (int i = 0; i < 3000; ++i) {
+  for (int i = 0; i < 300; ++i) {
     const Vector3d p(number(engine), number(engine), 1.5 + 0.35 * number(engine));
     const Touched truth = touched(map, p, 0.4);
     if (window.is_free(p)) {
       ++free;
       EXPECT_FALSE(truth.unfree) << p.transpose();
     }
-    if (window.is_clear(p)) EXPECT_FALSE(truth.occupied) << p.transpose();
+    EXPECT_FALSE(window.is_clear(p) && truth.occupied) << p.transpose();
     // One voxel more on all sides is always enough.
     if (!touched(map, p, 0.58).unfree && !window.is_free(p)) ++missed;
     EXPECT_EQ(window.at(p), map.at(p));
   }
-  EXPECT_GT(free, 100);
+  EXPECT_GT(free, 20);
   EXPECT_EQ(missed, 0);
 }
 
@@ -100,8 +105,7 @@ TEST(LocalWindow, KnowsNothingBeyondItselfAndWhatItIsTold) {
 TEST(LocalGuide, LeadsStraightWhereNothingStandsAndAroundAWall) {
   auto tree = std::make_unique<octomap::OcTree>(0.1);
   for (int y = -30; y < 15; ++y) {
-    for (int z = 0; z < 32; ++z)
-      tree->updateNode(octomap::point3d(1.05F, 0.1F * y + 0.05F, 0.1F * z + 0.05F), true);
+    for (int z = 0; z < 32; ++z) tree->updateNode(voxel(10, y, z), true);
   }
   const auto walled = mapping::OccupancyMap::create({}, std::move(tree));
   const auto empty = mapping::OccupancyMap::create();
