@@ -29,7 +29,9 @@ set(pade_public_headers
   depth/derotation.hpp
   depth/edges.hpp
   depth/focus_of_expansion.hpp
-  depth/motion_refinement.hpp
+  depth/motion/baseline_window.hpp
+  depth/motion/motion_alignment.hpp
+  depth/motion/motion_refinement.hpp
   depth/multi_view/common_error.hpp
   depth/multi_view/views_depth.hpp
   mapping/occupancy_map.hpp

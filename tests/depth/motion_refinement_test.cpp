@@ -1,4 +1,4 @@
-#include "pade/depth/motion_refinement.hpp"
+#include "pade/depth/motion/motion_refinement.hpp"
 
 #include <cmath>
 #include <functional>

@@ -229,6 +229,58 @@ TEST(ObstacleMapper, ImagesMendPosesThatAreOff) {
   EXPECT_GT(as_given / 4, 0.03) << "the flight shows nothing";
 }
 
+/// Error of the last depth image after one common scale, with steps whose lengths err by 20 % (uniform).
+double error_but_for_scale(const ObstacleMapperOptions& options, std::uint64_t seed) {
+  const ForwardFlight& f = forward();
+  auto m = std::move(ObstacleMapper::create(f.scene.camera, options)).value();
+  Random random(seed);
+  constexpr double kTurn = 0.001;  // degrees: as good as exact
+  constexpr double kSpread = 0.2;
+  const MapperUpdate* update = nullptr;
+  Pose noisy = f.scene.T_world_camera[0];
+  for (std::size_t k = 0; k < f.images.size(); ++k) {
+    Matrix6d covariance = Matrix6d::Zero();
+    if (k > 0) {
+      Pose step = f.scene.T_world_camera[k - 1].inverse() * f.scene.T_world_camera[k];
+      const double sigma = kSpread / std::numbers::sqrt3 * step.translation.norm();
+      step.translation *= 1 + random.uniform(-kSpread, kSpread);
+      noisy = noisy * step;
+      covariance(2, 2) = sigma * sigma;
+      covariance.bottomRightCorner<3, 3>() =
+          std::pow(kTurn * std::numbers::pi / 180, 2) * Eigen::Matrix3d::Identity();
+    }
+    update = &m.add(f.images[k], f.scene.times[k], noisy, covariance);
+  }
+  EXPECT_EQ(update->aligned, options.alignment.on);
+  std::vector<float> ratios;
+  for (int v = 0; v < f.truth.rows; ++v) {
+    for (int u = 0; u < f.truth.cols; ++u) {
+      const float ratio = update->depth.depth.at<float>(v, u) / f.truth.at<float>(v, u);
+      if (std::isfinite(ratio)) ratios.push_back(ratio);
+    }
+  }
+  std::sort(ratios.begin(), ratios.end());
+  const float scale = ratios[ratios.size() / 2];
+  for (float& ratio : ratios) ratio = std::abs(ratio / scale - 1);
+  const auto most = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() * 4 / 5);
+  std::nth_element(ratios.begin(), most, ratios.end());
+  return static_cast<double>(*most);
+}
+
+TEST(ObstacleMapper, StepsOfUncertainLengthAreMadeToFitEachOther) {
+  double fitted = 0;
+  double as_given = 0;
+  ObstacleMapperOptions off;
+  off.alignment.on = false;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    fitted += error_but_for_scale({}, seed);
+    as_given += error_but_for_scale(off, seed);
+  }
+  RecordProperty("error",
+                 std::to_string(fitted / 4) + " fitted, " + std::to_string(as_given / 4) + " as given");
+  EXPECT_LT(fitted, 0.5 * as_given);
+}
+
 TEST(ObstacleMapper, ExactPosesAreLeftAsTheyAreToTheLastBit) {
   const ForwardFlight& f = forward();
   auto m = std::move(ObstacleMapper::create(f.scene.camera)).value();

@@ -4,7 +4,7 @@
 #include "pade/core/option_check.hpp"
 #include "pade/depth/depth_options.hpp"
 #include "pade/depth/edges.hpp"
-#include "pade/depth/motion_refinement.hpp"
+#include "pade/depth/motion/motion_refinement.hpp"
 
 namespace pade::depth {
 

@@ -27,4 +27,10 @@ RelativeMotion with_noise(const RelativeMotion& motion, const MotionNoise& noise
   return noisy;
 }
 
+PoseNoise pose_noise(const RelativeMotion& motion, const MotionNoise& noise) {
+  if (noise.model == NoiseModel::multiplicative) return uniform_noise(motion, noise.level);
+  return {Eigen::Vector3d::Constant(additive_translation * noise.level),
+          Eigen::Vector3d::Constant(additive_rotation * noise.level)};
+}
+
 }  // namespace pade::evaluation

@@ -7,6 +7,7 @@
 
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/evaluation/cramer_rao.hpp"
 
 namespace pade::evaluation {
 
@@ -44,6 +45,9 @@ enum class Measured {
 /// components stay, with speed_alone rotation as well.
 RelativeMotion with_noise(const RelativeMotion& motion, const MotionNoise& noise, Measured measured,
                           std::uint64_t seed);
+
+/// Its standard deviations.
+PoseNoise pose_noise(const RelativeMotion& motion, const MotionNoise& noise);
 
 }  // namespace pade::evaluation
 

@@ -103,7 +103,8 @@ bool many_views(const ObstacleMapperOptions& o) {
   return o.views.count > 0 && two_baselines(o) && o.depth.window == 1 && o.depth.gates == depth::Gates::on;
 }
 
-constexpr int kGuidedLevel = 1;  // flow over the longer baseline starts near its end
+constexpr double kScaleDrift = 1e-5;  // variance of the logarithm, from frame to frame
+constexpr int kGuidedLevel = 1;       // flow over the longer baseline starts near its end
 
 }  // namespace
 
@@ -116,6 +117,7 @@ Status check(const ObstacleMapperOptions& o) {
   };
   if (Status status = check_ranges(ranges); !status) return status;
   if (Status status = within("refinement", check(o.refinement)); !status) return status;
+  if (Status status = within("alignment", check(o.alignment)); !status) return status;
   if (Status status = within("depth", check(o.depth)); !status) return status;
   if (Status status = within("edges", check(o.edges)); !status) return status;
   if (Status status = within("views", check(o.views)); !status) return status;
@@ -136,6 +138,7 @@ ObstacleMapperOptions one_pair(ObstacleMapperOptions options) {
   options.longest_step = 1;
   options.prior_level = -1;
   options.refinement.on = false;
+  options.alignment.on = false;
   options.edges.radius = 0;
   options.outlines = false;
   options.views.count = 0;
@@ -182,6 +185,8 @@ ObstacleMapper::ObstacleMapper(const Camera& camera, const ObstacleMapperOptions
       flow_(std::move(flow)),
       guide_(std::move(guide)),
       refiner_(options.refinement),
+      aligner_(options.alignment),
+      baselines_(options.views.frames),
       depth_(options.depth),
       views_(options.views.flow),
       map_(std::move(map)) {
@@ -210,6 +215,7 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
                                         const Matrix6d& motion_covariance) {
   ++health_.frames;
   update_.seconds = {};
+  update_.aligned = false;
   const Stopwatch total(update_, Stage::total);
   update_.reason = reason_to_skip(image, time, T_world_camera);
   if (!update_.reason.empty()) {
@@ -267,6 +273,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
   Pair pair = match(reference, newest_is_reference ? older.frame : newest.frame, prior,
                     flow_of_the_first_pair(), foretold);
   refine(pair, reference);
+  if (many_views(options_)) refine_by_depth(prior, pair, newest.frame);
   place(newest, older);
 
   // Average optical flow and calculate the depth image (Section 2.3).
@@ -327,6 +334,81 @@ void ObstacleMapper::refine(Pair& pair, const Frame& reference) {
                        image ? pair.motion.R_reference_other : Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
                        reference.image, unseen});
   pair.motion = update_.refinement.motion;
+}
+
+/// Aligns the newest frame with the depth of the last one.
+depth::AlignedMotion ObstacleMapper::align(const RelativeMotion& given, const Pair& pair,
+                                           const Frame& newest) {
+  const Frame& last = recent_.back().frame;
+  if (update_.views == 0 || update_.depth.time != last.time) return {pair.motion};
+  depth::AlignmentInput input{camera_, newest.image, last.image, update_.depth, given, pair.motion};
+  for (const int frames : seen_from_) {
+    if (frames >= std::ssize(recent_)) break;
+    const Frame& view = before(frames + 1).frame;
+    input.views.push_back({view.image, view.T_world_camera.inverse() * last.T_world_camera});
+  }
+  return aligner_.align(input);
+}
+
+/// The motion of the pair by the depth of the last frame, if there is one, and its length by those of the
+/// steps before.
+void ObstacleMapper::refine_by_depth(const RelativeMotion& given, Pair& pair, const Frame& newest) {
+  const Stopwatch watch(update_, Stage::refine);
+  using depth::RefinementOutcome;
+  depth::RefinedMotion& refinement = update_.refinement;
+  const bool asked = options_.alignment.on && options_.step == 1;
+  if (!asked || refinement.outcome == RefinementOutcome::off ||
+      refinement.outcome == RefinementOutcome::exact_prior) {
+    baselines_.clear();
+    return;
+  }
+  const depth::AlignedMotion aligned = align(given, pair, newest);
+  RelativeMotion motion = aligned.motion;
+  const double length = motion.t_reference_other.norm();
+  if (!(length > 0)) {
+    baselines_.clear();
+    return;
+  }
+  const Eigen::Vector3d direction = motion.t_reference_other / length;
+  Eigen::Matrix3d covariance = motion.covariance.topLeftCorner<3, 3>();
+  const double along = direction.dot(covariance * direction);
+  std::optional<depth::BaselineWindow::Seen> seen;
+  if (aligned.aligned) seen = {length, along / (length * length) + kScaleDrift, update_.step};
+  stretch(baselines_.push(given, direction, seen));
+  motion.t_reference_other = baselines_.length() * direction;
+  covariance += (baselines_.variance() * motion.t_reference_other.squaredNorm() - along) * direction *
+                direction.transpose();
+  motion.covariance.topLeftCorner<3, 3>() = covariance;
+  update_.aligned = aligned.aligned;
+  if (aligned.aligned) refinement.outcome = RefinementOutcome::refined;
+  if (refinement.outcome != RefinementOutcome::refined) return;
+  refinement.motion = pair.motion = motion;
+  depth::state_length_and_direction(refinement);
+}
+
+/// Stretches the steps of the past about the last frame, and with them its depth.
+/// @param factors  of the steps, oldest first
+void ObstacleMapper::stretch(const std::vector<double>& factors) {
+  if (factors.empty()) return;
+  const Eigen::Vector3d last = recent_.back().frame.T_world_camera.translation;
+  Eigen::Vector3d was = last;
+  Eigen::Vector3d is = last;
+  double before_stretching = 0;
+  double stretched = 0;
+  const int steps = std::min(static_cast<int>(factors.size()), static_cast<int>(recent_.size()) - 1);
+  for (int i = 1; i <= steps; ++i) {
+    Eigen::Vector3d& p =
+        recent_[recent_.size() - 1 - static_cast<std::size_t>(i)].frame.T_world_camera.translation;
+    const Eigen::Vector3d step = p - was;
+    const double factor = factors[factors.size() - static_cast<std::size_t>(i)];
+    was = p;
+    is += factor * step;
+    p = is;
+    if (i > update_.step) continue;
+    before_stretching += step.norm();
+    stretched += factor * step.norm();
+  }
+  if (!found_.empty() && stretched > 0) found_.rho *= before_stretching / stretched;
 }
 
 /// Hangs the newest frame on the older one by the refined motion.
@@ -447,6 +529,7 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   update_.motion = motions.back();
   update_.step = chosen.back();
   update_.views = static_cast<int>(chosen.size());
+  seen_from_ = chosen;
 }
 
 void ObstacleMapper::estimate_depth(const Pair& pair, const Frame& reference,

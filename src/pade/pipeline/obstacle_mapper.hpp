@@ -23,7 +23,9 @@
 #include "pade/depth/depth_estimator.hpp"
 #include "pade/depth/depth_options.hpp"
 #include "pade/depth/edges.hpp"
-#include "pade/depth/motion_refinement.hpp"
+#include "pade/depth/motion/baseline_window.hpp"
+#include "pade/depth/motion/motion_alignment.hpp"
+#include "pade/depth/motion/motion_refinement.hpp"
 #include "pade/depth/multi_view/views_depth.hpp"
 #include "pade/flow/epipolar/multi_view.hpp"
 #include "pade/flow/flow_estimator.hpp"
@@ -67,6 +69,7 @@ struct ObstacleMapperOptions {
   int prior_level = 3;
   double largest_parallax = 40;
   depth::MotionRefinementOptions refinement;
+  depth::MotionAlignmentOptions alignment;
   depth::DepthOptions depth = depth::chain_options();
   depth::EdgeOptions edges;
   bool outlines = true;
@@ -89,6 +92,7 @@ struct ObstacleMapperOptions {
     field("largest_parallax", self.largest_parallax,
           "the longest baseline is one over which four fifths of the image move less, px");
     field("refinement", self.refinement, "motion refined by the images");
+    field("alignment", self.alignment, "motion refined by the depth of the last frame");
     field("edges", self.edges, "depth at edges");
     field("outlines", self.outlines, "patches without texture are bounded by what their outlines show");
     field("depth", self.depth, "depth from motion");
@@ -134,6 +138,7 @@ struct MapperUpdate {
                    ///< image); with further views this is the pair of options.step
   depth::RefinedMotion refinement;      ///< of the motion over `step` of the options, and how it was found
   DepthImage depth;                     ///< of the reference: depth, variance, state, bound per pixel
+  bool aligned = false;                 ///< the depth of the frame before has refined the motion further
   depth::DepthDiagnostics diagnostics;  ///< of the (last) pair
   mapping::MapChange change;            ///< what the depth image changed in the map
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
@@ -193,6 +198,9 @@ class ObstacleMapper {
   Pair match(const Frame& reference, const Frame& other, const RelativeMotion& motion,
              flow::FlowEstimator& method, const cv::Mat& initial);
   void refine(Pair& pair, const Frame& reference);
+  depth::AlignedMotion align(const RelativeMotion& given, const Pair& pair, const Frame& newest);
+  void refine_by_depth(const RelativeMotion& given, Pair& pair, const Frame& newest);
+  void stretch(const std::vector<double>& factors);
   void place(Tracked& newest, const Tracked& older) const;
   [[nodiscard]] int longer_step(const Frame& newest, const Pair& first) const;
   void look_farther_back(const Frame& newest, Pair& pair);
@@ -208,6 +216,9 @@ class ObstacleMapper {
   std::unique_ptr<flow::FlowEstimator> flow_;   // of the last pair
   std::unique_ptr<flow::FlowEstimator> guide_;  // of the first of two: refines the motion, starts the other
   depth::MotionRefiner refiner_;
+  depth::MotionAligner aligner_;
+  depth::BaselineWindow baselines_;
+  std::vector<int> seen_from_;  // views of the last depth image, in frames before it
   depth::DepthEstimator depth_;
   flow::MultiViewEstimator views_;
   depth::InverseDepthImage found_;  // of the last frame, by several views

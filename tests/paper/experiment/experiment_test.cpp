@@ -10,16 +10,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
-#include "pade/io/sequence/trajectory.hpp"
 #include "pade/paper/experiment/experiment_results.hpp"
 #include "pade/paper/experiment/experiment_run.hpp"
 #include "pade/paper/tables/experiment_finish.hpp"
 #include "pade/paper/tables/experiment_tables.hpp"
-#include "pade/simulation/analytic/analytic_flights.hpp"
-#include "pade/simulation/analytic/analytic_render.hpp"
 
+#include "paper/experiment/tiny_flight.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace pade::experiment {
@@ -30,34 +27,12 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-void write_flight(const fs::path& folder, const std::string& name) {
-  fs::create_directories(folder / "rgb");
-  fs::create_directories(folder / "depth");
-  const auto flight = *simulation::make_analytic_flight(name, 4, simulation::analytic_camera(96, 72));
-  std::vector<io::StampedPose> poses;
-  for (std::size_t k = 0; k < flight.times.size(); ++k) {
-    const std::string file = to_string(flight.times[k]) + ".png";
-    const Pose& pose = flight.T_world_camera[k];
-    cv::imwrite(folder / "rgb" / file, simulation::render_image(flight.scene, flight.camera, pose));
-    cv::Mat depth = simulation::exact_depth(flight.scene, flight.camera, pose);
-    cv::patchNaNs(depth);
-    depth.convertTo(depth, CV_16U, 1000);
-    cv::imwrite(folder / "depth" / file, depth);
-    poses.push_back({flight.times[k], pose});
-  }
-  std::ofstream(folder / "groundtruth.txt") << io::format_trajectory(poses);
-  const Camera& c = flight.camera;
-  std::ofstream(folder / "camera.yaml")
-      << "width: " << c.width << "\nheight: " << c.height << "\nfx: " << c.fx << "\nfy: " << c.fy
-      << "\ncx: " << c.cx << "\ncy: " << c.cy
-      << "\ndistortion_model: none\ndepth_scale: 1000\nworld_up: \"+z\"\n";
-}
-
 class ExperimentRun : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     root_ = std::make_unique<test::TemporaryFolder>();
-    for (const char* name : {"forward", "sideways", "turning"}) write_flight(root_->path() / name, name);
+    for (const char* name : {"forward", "sideways", "turning"})
+      test::write_flight(root_->path() / name, name);
     PlanOptions options;
     options.flows = "lucas-kanade-half";
     options.draws = 2;

@@ -13,6 +13,7 @@
 #include "pade/depth/derotation.hpp"
 #include "pade/evaluation/cramer_rao.hpp"
 #include "pade/io/atomic_output.hpp"
+#include "pade/paper/experiment/experiment_chain.hpp"
 
 namespace pade::experiment {
 namespace {
@@ -20,14 +21,6 @@ namespace {
 constexpr int kTogetherGrid = 4;  // two methods are compared on one pixel per window of the paper's 4 x 4
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-
-/// The standard deviations of the noise of a level.
-evaluation::PoseNoise pose_noise(const RelativeMotion& motion, const evaluation::MotionNoise& noise) {
-  if (noise.model == evaluation::NoiseModel::multiplicative)
-    return evaluation::uniform_noise(motion, noise.level);
-  return {Eigen::Vector3d::Constant(evaluation::additive_translation * noise.level),
-          Eigen::Vector3d::Constant(evaluation::additive_rotation * noise.level)};
-}
 
 cv::Mat grey(const cv::Mat& image) {
   if (image.channels() == 1) return image;
@@ -130,7 +123,7 @@ class Pass {
   /// beyond the range is none.
   void add_bound(const RelativeMotion& motion, const cv::Mat& truth, Time time) {
     const cv::Mat sigma = evaluation::depth_bound(sequence_.camera(), motion, truth, job_.bound_sigma,
-                                                  pose_noise(motion, job_.noise));
+                                                  evaluation::pose_noise(motion, job_.noise));
     Random random(noise_seed(job_, job_.draws, time));
     cv::Mat best(truth.size(), CV_32FC1, cv::Scalar(kNone));
     for (int y = kTogetherGrid / 2; y < truth.rows; y += kTogetherGrid) {
@@ -186,6 +179,7 @@ class Pass {
 }  // namespace
 
 Result<JobResult> run_job(const Job& job, const io::Sequence& sequence, const std::function<bool()>& go_on) {
+  if (!job.chain.empty()) return run_chain_job(job, sequence, go_on);
   auto flow = flow::make_flow_estimator(job.flow);
   if (!flow) return flow.error();
   Pass pass(job, sequence, std::move(flow).value());

@@ -33,6 +33,7 @@ struct Job {
   std::string table;     ///< that it was made for
   std::string sequence;  ///< name
   std::string flow;
+  std::string chain;  ///< method of chain_methods() that makes the depth of both cells; empty = as follows
   depth::Derotation derotation = depth::Derotation::flow;
   Order order = Order::first;
   int step = 1;

@@ -9,6 +9,7 @@
 #include "pade/core/fingerprint.hpp"
 #include "pade/core/version.hpp"
 #include "pade/io/options_json.hpp"
+#include "pade/paper/experiment/experiment_chain.hpp"
 #include "pade/paper/experiment/experiment_job.hpp"
 
 namespace pade::experiment {
@@ -99,9 +100,14 @@ Json to_value(const Job& job) {
                      {"noise_on", static_cast<int>(cell.measured)},
                      {"rival", cell.rival}});
   }
+  Json chain = Json::object();
+  if (!job.chain.empty()) {
+    chain = {{"name", job.chain}, {"mapper", Json::parse(io::to_json(chain_options(job.chain, job.range)))}};
+  }
   return {{"table", job.table},
           {"sequence", job.sequence},
           {"flow", job.flow},
+          {"chain", std::move(chain)},
           {"derotate", to_name(job.derotation)},
           {"order", to_name(job.order)},
           {"step", job.step},

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "pade/paper/experiment/experiment_chain.hpp"
+
 namespace pade::experiment {
 namespace {
 
@@ -136,6 +138,29 @@ void add_errata(const PlanOptions& options, const std::string& sequence, std::ve
   }
 }
 
+void add_beyond(const PlanOptions& options, const std::string& sequence, std::vector<Job>& jobs) {
+  for (const evaluation::MotionNoise& noise : chain_noises()) {
+    for (const ChainMethod& method : chain_methods()) {
+      if (noise.level == 0 && method.only_with_noise) continue;
+      Job job;
+      job.table = "beyond";
+      job.sequence = sequence;
+      job.chain = method.name;
+      job.flow = chain_options(method.name, options.range).flow;
+      job.range = options.range;
+      job.noise = noise;
+      job.seed = static_cast<std::uint64_t>(options.seed);
+      for (const std::string& name : {std::string(method.name), scaled_cell(method.name)}) {
+        DepthCell cell;
+        cell.name = name;
+        cell.depth = chain_options(method.name, options.range).depth;
+        job.cells.push_back(std::move(cell));
+      }
+      jobs.push_back(std::move(job));
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> words(std::string_view list) {
@@ -214,6 +239,7 @@ std::vector<Job> plan(const PlanOptions& options, const std::vector<std::string>
     if (wanted(options, "figure3")) add_figure3(options, sequence, jobs);
     if (wanted(options, "windows")) add_windows(options, sequence, jobs);
     if (wanted(options, "errata")) add_errata(options, sequence, jobs);
+    if (wanted(options, "beyond")) add_beyond(options, sequence, jobs);
   }
   return jobs;
 }

@@ -10,6 +10,7 @@
 #include "pade/core/version.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/paper/experiment/experiment_results.hpp"
+#include "pade/paper/tables/beyond_tables.hpp"
 #include "pade/paper/tables/experiment_plots.hpp"
 #include "pade/paper/tables/experiment_report.hpp"
 #include "pade/paper/tables/experiment_tables.hpp"
@@ -164,6 +165,7 @@ std::vector<Section> sections_of(const Results& results, const std::vector<Verdi
   if (!results.flight.empty()) sections.push_back(flight_section(results));
   if (results.has("windows")) sections.push_back(section(results, windows_table(results), {windows_plots}));
   if (results.has("errata")) sections.push_back(section(results, errata_table(results)));
+  if (results.has("beyond")) sections.push_back(section(results, beyond_table(results), {beyond_plots}));
   if (results.has("table1")) sections.push_back({changed_outcomes_table(results)});
   return sections;
 }

@@ -1,4 +1,4 @@
-#include "pade/depth/motion_refinement.hpp"
+#include "pade/depth/motion/motion_refinement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -216,6 +216,15 @@ Measurement measurement(const Sums& sums, const Matrix6d& floor, double inflatio
           correlation};
 }
 
+RefinedMotion unchanged(const RelativeMotion& prior, RefinementOutcome outcome, RefinedMotion so_far = {}) {
+  so_far.motion = prior;
+  so_far.outcome = outcome;
+  state_length_and_direction(so_far);
+  return so_far;
+}
+
+}  // namespace
+
 void state_length_and_direction(RefinedMotion& out) {
   const Eigen::Vector3d& t = out.motion.t_reference_other;
   const double length = t.norm();
@@ -234,15 +243,6 @@ void state_length_and_direction(RefinedMotion& out) {
   out.direction_sigma = std::sqrt(0.5 * (trace + spread)) / length;
   out.direction_valid = out.direction_sigma < kValidDirection;
 }
-
-RefinedMotion unchanged(const RelativeMotion& prior, RefinementOutcome outcome, RefinedMotion so_far = {}) {
-  so_far.motion = prior;
-  so_far.outcome = outcome;
-  state_length_and_direction(so_far);
-  return so_far;
-}
-
-}  // namespace
 
 AcrossLine across_line(const Camera& camera, const Eigen::Vector3d& t, const Eigen::Matrix3d& R,
                        const MotionRefiner::Match& match) {

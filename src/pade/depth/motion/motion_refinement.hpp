@@ -114,6 +114,9 @@ class MotionRefiner {
   std::vector<Match> matches_;
 };
 
+/// Fills in `length_sigma_relative`, `direction_sigma` and `direction_valid` from the motion.
+void state_length_and_direction(RefinedMotion& motion);
+
 /// Flow across the epipolar line of one match, and its derivatives.
 struct AcrossLine {
   double residual;  ///< px; NaN if the match lies behind the camera or there is no line (a = 0)
