@@ -38,7 +38,8 @@ set(pade_public_headers
   io/atomic_output.hpp
   io/formats/map_files.hpp
   io/world.hpp
-  pipeline/obstacle_mapper.hpp)
+  pipeline/obstacle_mapper.hpp
+  pipeline/recent_frames.hpp)
 install(TARGETS pade_pose pade_core pade_navigation pade_flow pade_depth pade_mapping pade_io pade
         EXPORT padeTargets COMPONENT libpade-dev)
 install(EXPORT padeTargets NAMESPACE pade:: DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)

@@ -74,18 +74,6 @@ RelativeMotion motion_between(const Pose& older, const Pose& newer, double durat
   return order == Order::newest ? reversed(forward) : forward;
 }
 
-/// Covariance of a motion over `n` refined ones: what the images have measured is new in each, the length of
-/// the baseline is not.
-Matrix6d over_several(const RelativeMotion& one, int n) {
-  Matrix6d sum = n * one.covariance;
-  const double length = one.t_reference_other.norm();
-  if (!(length > 0)) return sum;
-  const Eigen::Vector3d along = one.t_reference_other / length;
-  const double variance = along.dot(one.covariance.topLeftCorner<3, 3>() * along);
-  sum.topLeftCorner<3, 3>() += (n * n - n) * variance * along * along.transpose();
-  return sum;
-}
-
 /// Of a flow whose start is taken up at `level` at the coarsest.
 flow::FlowOptions flow_options(int level, flow::InitialFlow initial) {
   flow::FlowOptions options;
@@ -204,9 +192,9 @@ std::string ObstacleMapper::reason_to_skip(const cv::Mat& image, Time time, cons
   if (!pose.is_finite() || std::abs(pose.rotation.norm() - 1) > 1e-3) {
     return "the pose is not finite or its quaternion is not of unit norm";
   }
-  if (!recent_.empty() && time <= recent_.back().frame.time) {
+  if (!recent_.empty() && time <= recent_.last().frame.time) {
     return "time " + to_string(time) + " is not after that of the frame before, " +
-           to_string(recent_.back().frame.time);
+           to_string(recent_.last().frame.time);
   }
   return {};
 }
@@ -224,21 +212,20 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     return update_;
   }
 
-  Tracked newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera};
+  TrackedFrame newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera};
   {
     const Stopwatch watch(update_, Stage::grey);
     newest.frame.image = to_grey(image);
   }
   update_.outcome = MapperUpdate::Outcome::waiting;
-  if (recent_.size() >= static_cast<std::size_t>(options_.step)) {
+  if (recent_.size() >= options_.step) {
     map_frame(newest);
     update_.outcome = MapperUpdate::Outcome::mapped;
     ++health_.mapped;
   }
-  recent_.push_back(std::move(newest));
   int kept = two_baselines(options_) ? options_.longest_step : options_.step;
   if (many_views(options_)) kept = std::max(kept, options_.views.frames);
-  if (recent_.size() > static_cast<std::size_t>(kept)) recent_.pop_front();
+  recent_.push(std::move(newest), kept);
   return update_;
 }
 
@@ -249,13 +236,9 @@ flow::FlowEstimator& ObstacleMapper::flow_of_the_first_pair() {
   return starts && !asked_for ? *guide_ : *flow_;
 }
 
-const ObstacleMapper::Tracked& ObstacleMapper::before(int frames) const {
-  return recent_[recent_.size() - static_cast<std::size_t>(frames)];
-}
-
 /// Figures 1 and 2 of the paper, for one frame and those before it.
-void ObstacleMapper::map_frame(Tracked& newest) {
-  const Tracked& older = before(options_.step);
+void ObstacleMapper::map_frame(TrackedFrame& newest) {
+  const TrackedFrame& older = recent_.before(options_.step);
   const bool newest_is_reference = options_.order == Order::newest;
   const Frame& reference = newest_is_reference ? newest.frame : older.frame;
   const bool two = two_baselines(options_);
@@ -304,7 +287,7 @@ void ObstacleMapper::map_frame(Tracked& newest) {
 cv::Mat ObstacleMapper::foretold_flow(const RelativeMotion& motion) const {
   const bool asks = options_.prior_level >= 0 && options_.order == Order::newest && options_.step == 1 &&
                     options_.derotation == depth::Derotation::image && options_.depth.window == 1;
-  if (!asks || update_.depth.empty() || update_.depth.time != recent_.back().frame.time) return {};
+  if (!asks || update_.depth.empty() || update_.depth.time != recent_.last().frame.time) return {};
   const Pose T_newest_last{Eigen::Quaterniond(motion.R_reference_other).normalized(),
                            motion.t_reference_other};
   return depth::foretell_flow(update_.depth.depth, camera_, T_newest_last, motion);
@@ -339,12 +322,12 @@ void ObstacleMapper::refine(Pair& pair, const Frame& reference) {
 /// Aligns the newest frame with the depth of the last one.
 depth::AlignedMotion ObstacleMapper::align(const RelativeMotion& given, const Pair& pair,
                                            const Frame& newest) {
-  const Frame& last = recent_.back().frame;
+  const Frame& last = recent_.last().frame;
   if (update_.views == 0 || update_.depth.time != last.time) return {pair.motion};
   depth::AlignmentInput input{camera_, newest.image, last.image, update_.depth, given, pair.motion};
   for (const int frames : seen_from_) {
-    if (frames >= std::ssize(recent_)) break;
-    const Frame& view = before(frames + 1).frame;
+    if (frames >= recent_.size()) break;
+    const Frame& view = recent_.before(frames + 1).frame;
     input.views.push_back({view.image, view.T_world_camera.inverse() * last.T_world_camera});
   }
   return aligner_.align(input);
@@ -374,7 +357,8 @@ void ObstacleMapper::refine_by_depth(const RelativeMotion& given, Pair& pair, co
   const double along = direction.dot(covariance * direction);
   std::optional<depth::BaselineWindow::Seen> seen;
   if (aligned.aligned) seen = {length, along / (length * length) + kScaleDrift, update_.step};
-  stretch(baselines_.push(given, direction, seen));
+  const double longer = recent_.stretch(baselines_.push(given, direction, seen), update_.step);
+  if (!found_.empty()) found_.rho *= 1 / longer;
   motion.t_reference_other = baselines_.length() * direction;
   covariance += (baselines_.variance() * motion.t_reference_other.squaredNorm() - along) * direction *
                 direction.transpose();
@@ -386,33 +370,8 @@ void ObstacleMapper::refine_by_depth(const RelativeMotion& given, Pair& pair, co
   depth::state_length_and_direction(refinement);
 }
 
-/// Stretches the steps of the past about the last frame, and with them its depth.
-/// @param factors  of the steps, oldest first
-void ObstacleMapper::stretch(const std::vector<double>& factors) {
-  if (factors.empty()) return;
-  const Eigen::Vector3d last = recent_.back().frame.T_world_camera.translation;
-  Eigen::Vector3d was = last;
-  Eigen::Vector3d is = last;
-  double before_stretching = 0;
-  double stretched = 0;
-  const int steps = std::min(static_cast<int>(factors.size()), static_cast<int>(recent_.size()) - 1);
-  for (int i = 1; i <= steps; ++i) {
-    Eigen::Vector3d& p =
-        recent_[recent_.size() - 1 - static_cast<std::size_t>(i)].frame.T_world_camera.translation;
-    const Eigen::Vector3d step = p - was;
-    const double factor = factors[factors.size() - static_cast<std::size_t>(i)];
-    was = p;
-    is += factor * step;
-    p = is;
-    if (i > update_.step) continue;
-    before_stretching += step.norm();
-    stretched += factor * step.norm();
-  }
-  if (!found_.empty() && stretched > 0) found_.rho *= before_stretching / stretched;
-}
-
 /// Hangs the newest frame on the older one by the refined motion.
-void ObstacleMapper::place(Tracked& newest, const Tracked& older) const {
+void ObstacleMapper::place(TrackedFrame& newest, const TrackedFrame& older) const {
   const bool refined = update_.refinement.outcome == depth::RefinementOutcome::refined;
   newest.corrected = refined || older.corrected;
   if (!newest.corrected) return;
@@ -440,9 +399,9 @@ int ObstacleMapper::longer_step(const Frame& newest, const Pair& first) const {
   const auto most = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() * 4 / 5);
   std::nth_element(parallax.begin(), most, parallax.end());
   const double baseline = first.motion.t_reference_other.norm();
-  const int available = std::min(options_.longest_step, static_cast<int>(recent_.size()));
+  const int available = std::min(options_.longest_step, recent_.size());
   for (int step = available; step > options_.step; --step) {
-    const Pose& T_world_other = before(step).frame.T_world_camera;
+    const Pose& T_world_other = recent_.before(step).frame.T_world_camera;
     const double longer = (T_world_other.translation - newest.T_world_camera.translation).norm();
     if (*most * longer <= options_.largest_parallax * baseline) return step;
   }
@@ -452,7 +411,7 @@ int ObstacleMapper::longer_step(const Frame& newest, const Pair& first) const {
 /// A second pair, over a longer baseline, that starts where the first has ended.
 void ObstacleMapper::look_farther_back(const Frame& newest, Pair& pair) {
   const int step = longer_step(newest, pair);
-  const Frame& other = before(step).frame;
+  const Frame& other = recent_.before(step).frame;
   const RelativeMotion motion = motion_to(newest, pair, step);
   cv::Mat start;
   {
@@ -471,33 +430,17 @@ void ObstacleMapper::look_farther_back(const Frame& newest, Pair& pair) {
 /// Of the frame `frames` before the newest one, seen from it, by the refined poses.
 /// @param pair  the newest one and its partner
 RelativeMotion ObstacleMapper::motion_to(const Frame& newest, const Pair& pair, int frames) const {
-  const Frame& other = before(frames).frame;
+  const Frame& other = recent_.before(frames).frame;
   RelativeMotion motion =
       relative_motion(newest.T_world_camera, other.T_world_camera, seconds_between(newest.time, other.time));
   motion.covariance = over_several(pair.motion, (frames + options_.step - 1) / options_.step);
   return motion;
 }
 
-/// Frames back to views whose baselines double, the longest one last.
-std::vector<int> ObstacleMapper::choose_views(const Frame& newest) const {
-  std::vector<int> views;
-  const int available = std::min(options_.views.frames, static_cast<int>(recent_.size()));
-  double wanted = std::numeric_limits<double>::infinity();
-  for (int i = available; i >= 1 && std::ssize(views) < options_.views.count; --i) {
-    const double length =
-        (before(i).frame.T_world_camera.translation - newest.T_world_camera.translation).norm();
-    if (length > wanted || !(length > 0)) continue;
-    views.push_back(i);
-    wanted = length / 2 * (1 + 1e-6);
-  }
-  std::reverse(views.begin(), views.end());
-  return views;
-}
-
 /// Several views at once, from where the pair has ended.
 void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   const Stopwatch watch(update_, Stage::depth);
-  const std::vector<int> chosen = choose_views(newest);
+  const std::vector<int> chosen = recent_.views(newest, options_.views.count, options_.views.frames);
   if (chosen.empty()) {
     found_ = {};
     return;
@@ -506,7 +449,7 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   std::vector<RelativeMotion> motions;
   for (const int frames : chosen) {
     motions.push_back(motion_to(newest, pair, frames));
-    views.push_back({before(frames).frame.image, {}, {}});
+    views.push_back({recent_.before(frames).frame.image, {}, {}});
   }
   const double baseline = motions.back().t_reference_other.norm();
   const double scale = camera_.fx * baseline;

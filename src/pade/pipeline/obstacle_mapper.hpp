@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstddef>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +29,7 @@
 #include "pade/flow/epipolar/multi_view.hpp"
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/mapping/occupancy_map.hpp"
+#include "pade/pipeline/recent_frames.hpp"
 
 namespace pade {
 
@@ -167,7 +167,7 @@ class ObstacleMapper {
                           const Matrix6d& motion_covariance = Matrix6d::Zero());
 
   /// Pose of the newest frame that was taken, in the map's world: as given, corrected by the images.
-  [[nodiscard]] const Pose& T_world_camera() const { return recent_.back().frame.T_world_camera; }
+  [[nodiscard]] const Pose& T_world_camera() const { return recent_.last().frame.T_world_camera; }
 
   [[nodiscard]] const ObstacleMapperOptions& options() const { return options_; }  ///< as given
   [[nodiscard]] const Camera& camera() const { return camera_; }                   ///< as given
@@ -175,12 +175,6 @@ class ObstacleMapper {
   [[nodiscard]] const mapping::OccupancyMap& map() const { return map_; }          ///< as of the last frame
 
  private:
-  /// A frame of the recent past, its pose refined.
-  struct Tracked {
-    Frame frame;
-    Pose given;              ///< T_world_camera as it came
-    bool corrected = false;  ///< frame.T_world_camera is another
-  };
   /// What was matched of two frames.
   struct Pair {
     RelativeMotion motion;
@@ -192,21 +186,18 @@ class ObstacleMapper {
                  mapping::OccupancyMap map);
   [[nodiscard]] std::string reason_to_skip(const cv::Mat& image, Time time, const Pose& pose) const;
   flow::FlowEstimator& flow_of_the_first_pair();
-  [[nodiscard]] const Tracked& before(int frames) const;
-  void map_frame(Tracked& newest);
+  void map_frame(TrackedFrame& newest);
   [[nodiscard]] cv::Mat foretold_flow(const RelativeMotion& motion) const;
   Pair match(const Frame& reference, const Frame& other, const RelativeMotion& motion,
              flow::FlowEstimator& method, const cv::Mat& initial);
   void refine(Pair& pair, const Frame& reference);
   depth::AlignedMotion align(const RelativeMotion& given, const Pair& pair, const Frame& newest);
   void refine_by_depth(const RelativeMotion& given, Pair& pair, const Frame& newest);
-  void stretch(const std::vector<double>& factors);
-  void place(Tracked& newest, const Tracked& older) const;
+  void place(TrackedFrame& newest, const TrackedFrame& older) const;
   [[nodiscard]] int longer_step(const Frame& newest, const Pair& first) const;
   void look_farther_back(const Frame& newest, Pair& pair);
   void see_from_many(const Frame& newest, const Pair& pair);
   [[nodiscard]] RelativeMotion motion_to(const Frame& newest, const Pair& pair, int frames) const;
-  [[nodiscard]] std::vector<int> choose_views(const Frame& newest) const;
   void estimate_depth(const Pair& pair, const Frame& reference, const std::optional<Eigen::Matrix3d>& removed,
                       DepthImage& out);
 
@@ -223,8 +214,8 @@ class ObstacleMapper {
   flow::MultiViewEstimator views_;
   depth::InverseDepthImage found_;  // of the last frame, by several views
   mapping::OccupancyMap map_;
-  std::deque<Tracked> recent_;  // grey, oldest first
-  DepthImage first_depth_;      // of the shorter baseline
+  RecentFrames recent_;
+  DepthImage first_depth_;  // of the shorter baseline
   MapperUpdate update_;
   MapperHealth health_;
 };

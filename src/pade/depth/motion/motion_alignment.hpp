@@ -99,7 +99,9 @@ class MotionAligner {
   /// A point of the last frame.
   struct Point {
     Eigen::Vector3f X;     ///< in its camera, m
-    float grey, gx, gy;    ///< and the slope, grey values per px of the level
+    float grey;            ///< grey value
+    float gx;              ///< its slope to the right, per px of the level
+    float gy;              ///< and downward
     float relative_sigma;  ///< of its depth
     int block;             ///< which part of the image it lies in
   };
