@@ -22,6 +22,7 @@ int run(int argc, char** argv) {
   pade::cli::add_sample(app, context);
   pade::cli::add_flow(app, context);
   pade::cli::add_simulate(app, context);
+  pade::cli::add_fly(app, context);
   pade::cli::add_navigate(app, context);
   pade::cli::add_plan(app, context);
   pade::cli::add_experiment(app, context);
