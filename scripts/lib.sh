@@ -12,6 +12,7 @@ packages_build=(
   liboctomap-dev libgeographiclib-dev
   libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev
   libsdformat-dev libembree-dev libassimp-dev  # the simulator, 15 MB of 58; the build does without where they are missing
+  libompl-dev  # `pade plan`; the build does without where it is missing
 )
 packages_test=(libgtest-dev libgmock-dev)
 packages_lint=(clang-format clang-tidy)
@@ -106,6 +107,16 @@ job_count() {
   [ "$memory" -lt "$cores" ] && echo "$memory" || echo "$cores"
 }
 
+# say_how_far LOG: while this script runs, every 25 s how far the log of a build says that it is.
+say_how_far() {
+  local seconds=0
+  while kill -0 $$ 2>/dev/null; do
+    sleep 1
+    seconds=$((seconds + 1))
+    [ $((seconds % 25)) != 0 ] || echo "  $(grep -oE '^\[[0-9]+/[0-9]+\]' "$1" | tail -n 1) after $seconds s"
+  done
+}
+
 # configure PRESET FOLDER: with a preset of CMakePresets.json.
 configure() {
   local log=$root/$2/build.log
@@ -126,14 +137,18 @@ build() {
   say "Building into $folder/ (preset $preset, $(job_count) jobs) ..."
   local start=$SECONDS
   configure "$preset" "$folder"
-  # At a terminal the build shows its own progress; in a pipe it speaks only when it fails.
+  # At a terminal the build shows its own progress; in a pipe it says every 25 s how far it is.
   if [ -t 1 ]; then
     cmake --build "$root/$folder" -j "$(job_count)" "${targets[@]}" || die "the build failed"
   else
-    cmake --build "$root/$folder" -j "$(job_count)" "${targets[@]}" >"$log" 2>&1 || {
+    say_how_far "$log" &
+    local speaker=$! failed=false
+    cmake --build "$root/$folder" -j "$(job_count)" "${targets[@]}" >"$log" 2>&1 || failed=true
+    kill "$speaker" 2>/dev/null || true
+    if [ "$failed" = true ]; then
       grep -vE '^\[[0-9]+/[0-9]+\] (Building|Linking)' "$log" | tail -n 60 >&2
       die "the build failed; all of its output is in $folder/build.log"
-    }
+    fi
   fi
   echo "  built in $((SECONDS - start)) s"
 }

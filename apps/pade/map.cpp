@@ -1,5 +1,6 @@
 // `pade map`: a recorded flight in, depth and an obstacle map out.
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -124,6 +125,7 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
 }
 
 Result<MapResult> map(const MapArguments& arguments) {
+  const auto started = std::chrono::steady_clock::now();
   const auto options = options_of(arguments);
   if (!options) return options.error();
   const auto stacks = io::ImageStacks::parse(arguments.save);
@@ -139,10 +141,11 @@ Result<MapResult> map(const MapArguments& arguments) {
   if (!writer) return writer.error();
 
   Progress progress("Mapping", sequence->size());
-  return map_sequence(*sequence, *options, *writer, arguments.threads, [&](const MapProgress& now) {
+  const auto step = [&](const MapProgress& now) {
     progress.step(fmt::format("{} depth images, {} skipped", now.mapped, now.skipped));
     return !io::interrupted();
-  });
+  };
+  return map_sequence(*sequence, *options, *writer, arguments.threads, step, started);
 }
 
 void print_table(const MapArguments& arguments, const MapResult& result) {

@@ -1,4 +1,4 @@
-// One line on a terminal that tells how far a long job is. In a pipe it is silent.
+// One line on a terminal that tells how far a long job is. In a pipe it is a line every 25 s.
 #pragma once
 
 #include <chrono>
@@ -26,8 +26,13 @@ class Progress {
   /// One more of the total is done. `note` is appended as it is.
   void step(const std::string& note = {}) {
     ++done_;
-    if (!visible_) return;
     const auto now = Clock::now();
+    if (!visible_) {
+      if (now - last_ < std::chrono::seconds(25)) return;
+      last_ = now;
+      fmt::print(stderr, "{}  {} of {}  {}\n", what_, done_, total_, note);
+      return;
+    }
     if (done_ < total_ && shown_ && now - last_ < std::chrono::milliseconds(100)) return;
     last_ = now;
     shown_ = true;
@@ -45,7 +50,7 @@ class Progress {
   bool visible_;
   bool shown_ = false;
   Clock::time_point start_ = Clock::now();
-  Clock::time_point last_;
+  Clock::time_point last_ = start_;
 };
 
 }  // namespace pade::cli

@@ -85,7 +85,7 @@ Status write_frames(const simulation::AnalyticFlight& flight, const SampleArgume
   for (std::size_t k = 0; k < flight.times.size(); ++k) {
     if (io::interrupted()) return io::interrupted_error();
     const Pose& pose = flight.T_world_camera[k];
-    simulation::RenderOptions options;
+    simulation::AnalyticRenderOptions options;
     options.noise_sigma = kSensorNoise;
     options.noise_seed = arguments.seed * 1000003 + k;
     options.threads = arguments.threads;

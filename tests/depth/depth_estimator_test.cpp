@@ -312,7 +312,7 @@ struct Seen {
   DepthDiagnostics diagnostics;
 };
 Seen see(const ScenePair& pair, const DepthOptions& options, double noise) {
-  simulation::RenderOptions sensor;
+  simulation::AnalyticRenderOptions sensor;
   sensor.noise_sigma = noise;
   sensor.noise_seed = 1;
   const cv::Mat reference =

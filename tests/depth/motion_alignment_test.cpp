@@ -25,7 +25,7 @@ struct Flown {
   explicit Flown(const std::string& name, int frames = 10)
       : flight(*simulation::make_analytic_flight(name, frames, simulation::analytic_camera(320, 240))) {
     for (const Pose& pose : flight.T_world_camera) {
-      simulation::RenderOptions options;
+      simulation::AnalyticRenderOptions options;
       options.noise_sigma = 1;
       options.noise_seed = images.size() + 1;
       images.push_back(simulation::render_image(flight.scene, flight.camera, pose, options));

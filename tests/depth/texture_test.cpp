@@ -1,11 +1,15 @@
 #include "pade/depth/texture.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
 #include "pade/core/depth_image.hpp"
 #include "pade/core/random.hpp"
+
+#include "support/guarded_image.hpp"
 
 namespace pade::depth {
 namespace {
@@ -111,11 +115,67 @@ TEST(TextureGate, WhereTheEpipoleIsNotKnownTextureMustRunInEveryDirection) {
   EXPECT_EQ(cv::countNonZero(gate_of(stripes, stripes, moving({0, 0, 0.2}))(beside)), 0);
 }
 
+/// Blocks of `gate` without texture within `radius` blocks of the one at (c, r), and beyond.
+std::pair<int, int> blank_blocks(const cv::Mat& gate, int c, int r, int radius) {
+  std::pair<int, int> count;
+  for (int y = 0; y < gate.rows / kTextureBlock; ++y) {
+    for (int x = 0; x < gate.cols / kTextureBlock; ++x) {
+      const bool near = std::max(std::abs(x - c), std::abs(y - r)) <= radius;
+      if (gate.at<std::uint8_t>(y * kTextureBlock, x * kTextureBlock) != 0)
+        ++(near ? count.first : count.second);
+    }
+  }
+  return count;
+}
+
+TEST(TextureGate, WhatABlockShowsCountsForItsNeighboursAndNoFarther) {
+  const int c = 20, r = 10;
+  const cv::Rect block(c * kTextureBlock, r * kTextureBlock, kTextureBlock, kTextureBlock);
+  const cv::Mat flat(kSize, CV_8UC1, cv::Scalar(120));
+  const int beyond = (kSize.width / kTextureBlock) * (kSize.height / kTextureBlock) - 25;
+  // Strong texture in one of the images is enough by its strength; faint texture must be in both.
+  for (const double amplitude : {60.0, 7.5}) {
+    cv::Mat waves;
+    grating(kSize, 1.2, 0).convertTo(waves, CV_8U, amplitude / 40, 120 - 128 * amplitude / 40);
+    cv::Mat textured = flat.clone();
+    waves(block).copyTo(textured(block));
+    const bool strong = amplitude > 40;
+    const cv::Mat gate =
+        gate_of(noisy(textured, 2, 1), noisy(strong ? flat : textured, 2, 2), moving({0.1, 0, 0}));
+    EXPECT_EQ(blank_blocks(gate, c, r, 1).first, 0) << amplitude;
+    EXPECT_GT(blank_blocks(gate, c, r, 2).second, 0.97 * beyond) << amplitude;
+  }
+}
+
+TEST(ImageNoise, IsReadWhereTheImageIsFlatInBothDirections) {
+  // Three quarters of the image have their edges right below the rows that are looked at, and flow that is
+  // wrong by a third of a pixel there.
+  cv::Mat clean(kSize, CV_8UC1, cv::Scalar(128));
+  for (int v = 0; v < kSize.height; ++v) clean.row(v).colRange(0, 120) = (v + 2) / 4 % 2 != 0 ? 60 : 200;
+  cv::Mat first = clean.clone();
+  cv::Mat second = clean.clone();
+  noisy(clean, 2, 1).colRange(120, kSize.width).copyTo(first.colRange(120, kSize.width));
+  noisy(clean, 2, 2).colRange(120, kSize.width).copyTo(second.colRange(120, kSize.width));
+  const FlowField wrong{cv::Mat(kSize, CV_32FC2, cv::Scalar(0, 0.33)), {}};
+  EXPECT_LT(image_noise(first, second, wrong), 4);
+}
+
 TEST(ImageNoise, IsNotChangedByExposureOrByTextureThatTheFlowMatches) {
   const cv::Mat texture = grating(kSize, 0.2, 0.13);
   const cv::Mat first = noisy(texture, 2, 1);
   const cv::Mat second = noisy(texture, 2, 2) + 9;
   EXPECT_NEAR(image_noise(first, second, kStill), 2, 0.5);
+}
+
+TEST(ImageNoise, ReadsNothingBehindTheImages) {
+  const cv::Size size(35, 27);  // rows and columns that are looked at reach the last but one
+  const cv::Mat image = noisy(cv::Mat(size, CV_8UC1, cv::Scalar(120)), 3, 1);
+  const test::GuardedImage first(image);
+  const test::GuardedImage second(image);
+  for (const cv::Vec2f& to : {cv::Vec2f(0, 0), cv::Vec2f(1, 0), cv::Vec2f(0, 1), cv::Vec2f(1, 1)}) {
+    const FlowField flow{cv::Mat(size, CV_32FC2, cv::Scalar(to[0], to[1])), {}};
+    EXPECT_GT(image_noise(first.get(), second.get(), flow), 0) << to;
+  }
 }
 
 TEST(ImageNoise, OfFlowThatMatchesNothingIsTheLeastNoise) {

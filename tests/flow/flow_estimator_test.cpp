@@ -14,6 +14,7 @@
 #include "pade/flow/methods/opencv_adapter.hpp"
 
 #include "flow/flow_scene.hpp"
+#include "support/guarded_image.hpp"
 
 namespace pade::flow {
 namespace {
@@ -237,6 +238,44 @@ TEST_P(OwnFlow, OfARegionIsThatOfThePictureThere) {
   EXPECT_TRUE(std::isnan(part.vectors.at<cv::Vec2f>(59, 70)[0]));
   EXPECT_LT(median_error(part.vectors(region), {1.2, 0.7}, 0), small_part());
   EXPECT_TRUE(estimate_region(*method, pair.first, pair.second, cv::Rect(900, 0, 5, 5)).empty());
+}
+
+TEST_P(OwnFlow, OfASmallRegionIsFoundAroundIt) {
+  const cv::Point2d shift(6, 4);
+  const ShiftedPair pair = shifted_pair({200, 160}, shift);
+  const cv::Rect region(90, 70, 14, 10);
+  const FlowField part = estimate_region(*make(GetParam()), pair.first, pair.second, region);
+  EXPECT_LT(median_error(part.vectors(region), shift, 0), small_part());
+}
+
+TEST_P(OwnFlow, OfAMaskThatLeavesOneOfFourPixelsReachesFarAllTheSame) {
+  const cv::Point2d shift(9.3, -6.2);
+  const ShiftedPair pair = shifted_pair({200, 160}, shift);
+  for (const cv::Point corner : {cv::Point(0, 0), cv::Point(1, 0), cv::Point(0, 1), cv::Point(1, 1)}) {
+    cv::Mat mask(pair.first.size(), CV_8UC1, cv::Scalar(0));
+    for (int y = corner.y; y < mask.rows; y += 2) {
+      for (int x = corner.x; x < mask.cols; x += 2) mask.at<std::uint8_t>(y, x) = 255;
+    }
+    auto method = make(GetParam());
+    method->set_mask(mask);
+    const cv::Mat vectors = method->estimate(pair.first, pair.second).vectors;
+    std::vector<double> errors;
+    for (int y = 40 + corner.y; y < 120; y += 2) {
+      for (int x = 40 + corner.x; x < 160; x += 2)
+        errors.push_back(cv::norm(vectors.at<cv::Vec2f>(y, x) - cv::Vec2f(cv::Vec2d(shift.x, shift.y))));
+    }
+    std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
+                     errors.end());
+    EXPECT_LT(errors[errors.size() / 2], 0.5) << corner;
+  }
+}
+
+TEST_P(OwnFlow, ReadsNothingBehindTheImages) {
+  const ShiftedPair pair = shifted_pair({67, 43}, {1.2, 0.7});
+  const test::GuardedImage first(pair.first);
+  const test::GuardedImage second(pair.second);
+  const FlowField guarded = make(GetParam())->estimate(first.get(), second.get());
+  EXPECT_TRUE(same_bits(guarded.vectors, make(GetParam())->estimate(pair.first, pair.second).vectors));
 }
 
 TEST_P(OwnFlow, IsLessSureWhereThereIsNothingToSeeOrNothingToMatch) {

@@ -131,6 +131,36 @@ TEST(InitialFlow, IsTakenUpAlikeByAnyNumberOfThreads) {
   }
 }
 
+TEST(InitialFlow, ThatDoesNotFitTheImagesIsNone) {
+  const testing::ShiftedPair pair = testing::shifted_pair({160, 120}, {2, 1});
+  const FlowOptions options = taken_up(InitialFlow::replaces, 0);
+  for (const char* name : {"lucas-kanade", "farneback", "clg-fast"}) {
+    const cv::Mat without = flow_of(name, options, pair.first, pair.second, {}).vectors;
+    for (const cv::Mat& initial :
+         {cv::Mat(30, 40, CV_32FC2, cv::Scalar(9, 9)), cv::Mat(120, 161, CV_32FC2, cv::Scalar(9, 9)),
+          cv::Mat(pair.first.size(), CV_64FC2, cv::Scalar(9, 9)),
+          cv::Mat(pair.first.size(), CV_32FC1, cv::Scalar(9))}) {
+      const cv::Mat with = flow_of(name, options, pair.first, pair.second, initial).vectors;
+      EXPECT_EQ(cv::norm(with, without, cv::NORM_INF), 0)
+          << name << " " << initial.size() << " " << initial.type();
+    }
+  }
+}
+
+TEST(InitialFlow, IsTurnedAroundOnTheWayBack) {
+  // Too far for the finest level alone: both ways must begin where they are told to.
+  const cv::Vec2f shift(-19, 7);
+  const testing::ShiftedPair pair = testing::shifted_pair({160, 120}, cv::Point2d(shift[0], shift[1]));
+  FlowOptions options = taken_up(InitialFlow::replaces, 0);
+  options.confidence = FlowConfidence::forward_backward;
+  const cv::Mat initial(pair.first.size(), CV_32FC2, cv::Scalar(shift[0], shift[1]));
+  for (const char* name : {"lucas-kanade", "clg-fast"}) {
+    const FlowField field = flow_of(name, options, pair.first, pair.second, initial);
+    const cv::Rect inside(50, 30, 70, 60);
+    EXPECT_LT(cv::mean(field.sigma(inside))[0], 0.2) << name;
+  }
+}
+
 TEST(InitialFlow, OfTheCoarsestLevelHasNothingToCompeteWith) {
   // As the only start of the search it is used as it is: a shift that the pyramid cannot find.
   const cv::Point2d shift(70, -55);

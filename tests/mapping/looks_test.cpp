@@ -155,6 +155,44 @@ TEST(Bounds, ASpotHidesWhatIsBehindItOnlyWhereMoreThanFreeHoleFits) {
   }
 }
 
+TEST(Bounds, ASpotMayBeWiderThanTheImageIsHigh) {
+  MapOptions options;
+  options.looks_baseline = 0;
+  options.free_hole = 1;
+  constexpr int kWide = 140;
+  static_assert(kWide > 120);
+  OccupancyMap map = map_of_looks(options);
+  DepthImage image = bounded_to(18);
+  image.bound(cv::Rect(10, 60, kWide, 2)).setTo(kNaN);
+  map.integrate(image, kCamera, level_at(0));
+  const double end = options.free_hole * kCamera.fx / kWide;
+  const Vector3d ray =
+      level_at(0).rotation * Vector3d((80 - kCamera.cx) / kCamera.fx, (60.5 - kCamera.cy) / kCamera.fy, 1);
+  for (double z = 0.5; z < end / 1.3 - 0.1; z += 0.02)
+    EXPECT_EQ(map.at(level_at(0).translation + z * ray), Occupancy::free) << z;
+  EXPECT_EQ(map.at(level_at(0).translation + (end + 0.3) * ray), Occupancy::unknown);
+}
+
+TEST(Bounds, EachLookMakesSurerWhatItSeesAndNothingBesideItDownToTheLimit) {
+  MapOptions options;
+  options.looks_baseline = 0;
+  OccupancyMap map = map_of_looks(options);
+  map.integrate(bounded_to(15), kCamera, level_at(0));  // large cubes of one state
+  DepthImage narrow = bounded_to(15);
+  for (const cv::Range& side : {cv::Range(0, 60), cv::Range(100, 160)})
+    narrow.bound.colRange(side).setTo(kNaN);
+  const double miss = options.p_miss / (1 - options.p_miss);
+  const double least = options.clamp_min / (1 - options.clamp_min);
+  for (int looks = 1; looks < 8; ++looks) {
+    const double odds = std::max(std::pow(miss, looks), least);
+    for (double x = 4; x < 12; x += 0.1) {
+      EXPECT_NEAR(map.probability({x, 0.03, 1.53}), odds / (1 + odds), 1e-4) << looks << " looks at " << x;
+      EXPECT_NEAR(map.probability({x, 0.03 + 0.35 * x, 1.53}), options.p_miss, 1e-4) << x;
+    }
+    map.integrate(narrow, kCamera, level_at(0));
+  }
+}
+
 TEST(Bounds, ASpotThatHasMeasuredSomethingIsNotClosed) {
   MapOptions options;
   options.looks_baseline = 0;
@@ -261,6 +299,24 @@ TEST(Hits, ANearGoodOneIsAnObstacleAtOnceAndAFarOneWaitsForAnotherPlace) {
   }
   far.integrate(wall(11.94, 0.02, 0), kCamera, level_at(0.1));
   EXPECT_GT(occupied(far), 2000U);
+}
+
+TEST(Hits, TheTailsOfTheNoiseBehindASurfaceAreNone) {
+  // One pixel in 14 says that the wall is two voxels farther: with nothing between, and its share of the
+  // voxel's pixels large enough for a thing of its own.
+  OccupancyMap map = map_of_looks();
+  DepthImage image = wall(5.05, 0.001, 0, 1, kLarge);
+  for (int v = 0; v < image.depth.rows; ++v) {
+    for (int u = 0; u < image.depth.cols; ++u) {
+      if ((u + 5 * v) % 14 == 0) image.depth.at<float>(v, u) = 5.25F;
+    }
+  }
+  map.integrate(image, kLarge, level_at(0));
+  std::size_t at_wall = 0;
+  std::size_t behind = 0;
+  for (const MapCell& cell : map.occupied()) ++(cell.centre.x() < 5.15F ? at_wall : behind);
+  EXPECT_GT(at_wall, 500U);
+  EXPECT_LT(behind, at_wall / 20);
 }
 
 TEST(Hits, ASigmaThatIsCommonToTheImageMovesTheSurfaceAndDoesNotRemoveIt) {

@@ -257,6 +257,26 @@ TEST(MapViews, TurnToTheWidthOfThePage) {
       << "the pole at the smallest y and the largest x";
 }
 
+TEST(MapViews, StaySmallHoweverLongTheFlight) {
+  constexpr int kPoles = 121;
+  auto tree = std::make_unique<octomap::OcTree>(0.1);
+  for (int i = 0; i < kPoles; ++i)
+    test::fill(*tree, {10.0 * i + 0.05, 2.05, 0.05}, {10.0 * i + 0.05, 2.05, 3}, true);
+  tree->updateInnerOccupancy();
+  const auto map = std::move(mapping::OccupancyMap::create({}, std::move(tree))).value();
+  std::vector<Eigen::Vector3d> path;
+  for (int i = 0; i <= 60000; ++i) path.emplace_back(0.02 * i, std::sin(1e-3 * i), 1.5);
+  const MapViews views = draw_map({map, path});
+  for (const std::string& svg : {views.top, views.level, views.side, views.section}) {
+    EXPECT_LE(picture_of(svg).cols, 1400);
+    EXPECT_LT(svg.size(), 250000U);
+  }
+  const cv::Mat top = picture_of(views.top);
+  cv::Mat empty;
+  cv::inRange(top, cv::Vec3b(0xa6, 0xa6, 0xa6), cv::Vec3b(0xa6, 0xa6, 0xa6), empty);
+  EXPECT_EQ(static_cast<int>(top.total()) - cv::countNonZero(empty), kPoles);
+}
+
 TEST(Corridor, IsDrawnToScale) {
   const std::vector<Eigen::Vector3d> path = {{0, 0, 0}, {2, 0, 0}};
   const CorridorViews views = draw_corridor({some_map(), path});

@@ -62,7 +62,7 @@ Status write_run(const fs::path& folder, const io::Sequence& sequence, std::stri
   info.sequence = sequence.folder();
   info.camera.width = size.width;
   info.camera.height = size.height;
-  return writer->finish(info, {});
+  return writer->finish(info, [] { return io::RunTiming(); });
 }
 
 class RunEvaluation : public testing::Test {

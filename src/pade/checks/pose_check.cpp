@@ -9,6 +9,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "pade/core/compute/median.hpp"
+
 namespace pade::evaluation {
 namespace {
 
@@ -137,13 +139,6 @@ double parallax_of(const std::vector<Track>& tracks, const Camera& camera, const
                     camera.fx * ((R * track.first).hnormalized() - track.second.head<2>()).norm());
   }
   return sum / static_cast<double>(tracks.size());
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The fits of all conventions to one pair, and of a camera at rest.
@@ -337,7 +332,7 @@ PoseCheck check_poses(std::span<const PoseCheckPair> pairs, const Camera& camera
   const auto over_pairs = [&fits](auto figure) {
     std::vector<double> values;
     for (const PairFits& fit : fits) values.push_back(figure(fit));
-    return median(std::move(values));
+    return median(std::move(values), std::numeric_limits<double>::infinity());
   };
   for (std::size_t i = 0; i < pose_conventions.size(); ++i) {
     ConventionScore score;

@@ -86,71 +86,122 @@ struct PoseEffect {
   return effect;
 }
 
-template <KernelDerotation kDerotation, bool kSamelson, bool kSigma, bool kPose>
+/// The derotated flow D (or d) of a pixel, and where its match lies in the other image.
+struct Derotated {
+  Vector2 d, match;
+};
+
+template <KernelDerotation kDerotation>
+[[gnu::always_inline]] inline Derotated derotated(const KernelParameters& k, float x, float y, float wx,
+                                                  float wy) {
+  Vector2 d{wx, wy};
+  Vector2 match{x + wx, y + wy};
+  if constexpr (kDerotation == KernelDerotation::none) {
+    const Vector2 shift = turned_shift(k.view, k, match.x, match.y);
+    match = {match.x + shift.x, match.y + shift.y};
+  } else if constexpr (kDerotation == KernelDerotation::exact) {
+    const Vector2 shift = turned_shift(k.turn, k, match.x, match.y);
+    d = {wx + shift.x, wy + shift.y};
+  } else if constexpr (kDerotation == KernelDerotation::remaining) {
+    const Vector2 left = turned_shift(k.turn, k, match.x, match.y);
+    d = {wx + left.x, wy + left.y};
+    const Vector2 shift = turned_shift(k.view, k, match.x, match.y);
+    match = {match.x + shift.x, match.y + shift.y};
+  } else {
+    const float u = x * k.inverse_fx;
+    const float v = y * k.inverse_fy;
+    d.x = wx + k.fx * (-u * v * k.omega[0] + (1.0F + u * u) * k.omega[1] - v * k.omega[2]);
+    d.y = wy + k.fy * (-(1.0F + v * v) * k.omega[0] + u * v * k.omega[1] + u * k.omega[2]);
+  }
+  return {d, match};
+}
+
+/// `yes` where all bits of `mask` are set, `no` where none is.
+[[gnu::always_inline]] inline float chosen(std::int32_t mask, float yes, float no) {
+  return __builtin_bit_cast(
+      float, (__builtin_bit_cast(std::int32_t, yes) & mask) | (__builtin_bit_cast(std::int32_t, no) & ~mask));
+}
+
+/// What a pixel is judged by.
+struct Evidence {
+  float z, aa, ad, sigma2;
+  bool inside;     ///< the match lies in the other image
+  bool parallax;   ///< enough of it for its noise
+  bool across_ok;  ///< the flow across the epipolar line is noise
+  bool has_flow;
+};
+
+/// State of a pixel: the strongest reason against it, from the weakest on.
+[[gnu::always_inline]] inline std::int32_t state_of(const KernelParameters& k, const Evidence& e,
+                                                    std::uint8_t gate) {
+  const bool in_front = (e.ad > 0.0F) & (e.z > 0.0F);
+  const std::int32_t low = e.aa < k.epipole2 ? kEpipole : kLowParallax;
+  std::int32_t why = kMeasured;
+  why = e.z <= k.range ? why : kLowParallax;
+  why = in_front ? why : kInconsistent;
+  why = e.parallax ? why : low;
+  why = e.across_ok ? why : kInconsistent;
+  why = e.has_flow & (e.sigma2 < 1e6F) ? why : kInconsistent;
+  why = e.inside ? why : kOutOfView;
+  why = gate == kNoTexture ? kNoTexture : why;
+  why = e.aa >= k.blind2 ? why : low;
+  return gate == kOutOfView ? kOutOfView : why;
+}
+
+/// The lower bound: the least |a| over the greatest parallax that are still likely; NaN where none is known.
+[[gnu::always_inline]] inline float bound_of(const KernelParameters& k, const Evidence& e,
+                                             const PoseEffect& pose, float d2, std::uint8_t gate) {
+  const float reach = __builtin_sqrtf(e.aa);
+  const bool directed = e.aa >= kDirectionSigmas2 * pose.reach;
+  const float along = e.ad / reach;
+  const float seen = directed ? (along > 0.0F ? along : 0.0F) : __builtin_sqrtf(d2);
+  const float least = reach - k.bound_k * __builtin_sqrtf(pose.reach);
+  const float most = seen + k.bound_k * __builtin_sqrtf(e.sigma2 + pose.parallax);
+  const float nothing_before = least / most + k.add_tz;
+  const bool behind = directed & (e.ad < 0.0F) & e.parallax;
+  const bool bounded = (gate == 0) & e.inside & (e.across_ok | !directed) & !behind & (e.sigma2 < 1e6F) &
+                       (least > 0.0F) & (nothing_before > 0.0F);
+  return bounded ? nothing_before : __builtin_nanf("");
+}
+
+/// Only what decides most of the work is a constant; what chooses between two numbers costs nothing in the
+/// loop.
+template <KernelDerotation kDerotation, bool kPose>
 void row(const KernelParameters& parameters, const float* __restrict x_of, const float y,
-         const float* __restrict flow, const float* __restrict sigma, const std::uint8_t* __restrict gate,
+         const float* __restrict flow, const float* __restrict sigma_of, const std::uint8_t* __restrict gate,
          std::size_t count, float* __restrict depth, float* __restrict variance,
          float* __restrict own_variance, float* __restrict bounds, std::uint8_t* __restrict state) {
   const KernelParameters k = parameters;  // a copy that no store through the outputs can change
   const float nan = __builtin_nanf("");
+  // Conditions in the loop would keep it from being vectorised: numbers and bits choose instead.
+  const float* const sigma = sigma_of != nullptr ? sigma_of : x_of;  // in place of none any finite numbers
+  const float scale2 = sigma_of != nullptr ? k.sigma_scale2 : 0.0F;
+  const float constant2 = sigma_of != nullptr ? 0.0F : k.sigma2;
+  const std::int32_t samelson = k.samelson ? -1 : 0;
 #pragma GCC ivdep  // five outputs and four inputs: more than the compiler would check for overlap
   for (std::size_t i = 0; i < count; ++i) {
     const float x = x_of[i];
     const float wx = flow[2 * i];
     const float wy = flow[2 * i + 1];
-
-    // a = -A t, and the derotated flow D (or d).
+    // a = -A t
     const float ax = x * k.tz - k.fx_tx;
     const float ay = y * k.tz - k.fy_ty;
-    Vector2 d{wx, wy};
-    Vector2 match{x + wx, y + wy};
-    if constexpr (kDerotation == KernelDerotation::none) {
-      const Vector2 shift = turned_shift(k.view, k, match.x, match.y);
-      match = {match.x + shift.x, match.y + shift.y};
-    } else if constexpr (kDerotation == KernelDerotation::exact) {
-      const Vector2 shift = turned_shift(k.turn, k, match.x, match.y);
-      d = {wx + shift.x, wy + shift.y};
-    } else if constexpr (kDerotation == KernelDerotation::remaining) {
-      const Vector2 left = turned_shift(k.turn, k, match.x, match.y);
-      d = {wx + left.x, wy + left.y};
-      const Vector2 shift = turned_shift(k.view, k, match.x, match.y);
-      match = {match.x + shift.x, match.y + shift.y};
-    } else {
-      const float u = x * k.inverse_fx;
-      const float v = y * k.inverse_fy;
-      d.x = wx + k.fx * (-u * v * k.omega[0] + (1.0F + u * u) * k.omega[1] - v * k.omega[2]);
-      d.y = wy + k.fy * (-(1.0F + v * v) * k.omega[0] + u * v * k.omega[1] + u * k.omega[2]);
-    }
+    const auto [d, match] = derotated<kDerotation>(k, x, y, wx, wy);
 
     const float aa = ax * ax + ay * ay;
     const float ad = ax * d.x + ay * d.y;
     const float across = ax * d.y - ay * d.x;
     const float d2 = d.x * d.x + d.y * d.y;
-    const float s = kSamelson ? ad / d2 : aa / ad;
-    const float z = s + k.add_tz;
-    const float sigma2 = (kSigma ? k.sigma_scale2 * sigma[i] * sigma[i] : k.sigma2) + k.relative2 * d2;
-
+    const float s = chosen(samelson, ad, aa) / chosen(samelson, d2, ad);
+    const float sigma2 = (scale2 * sigma[i] * sigma[i] + constant2) + k.relative2 * d2;
     const float ad2 = ad * ad;
     const float noise = sigma2 * aa;
     const bool inside =
         (match.x >= k.left) & (match.x <= k.right) & (match.y >= k.top) & (match.y <= k.bottom);
     const bool parallax = ad2 > k.parallax2 * noise;
     const bool across_ok = (across * across <= k.residual2 * noise) | (across * across <= k.tangent2 * ad2);
-    const bool in_front = (ad > 0.0F) & (z > 0.0F);
-
-    const std::int32_t low = aa < k.epipole2 ? kEpipole : kLowParallax;
-
-    // From the weakest to the strongest reason.
-    std::int32_t why = kMeasured;
-    why = z <= k.range ? why : kLowParallax;
-    why = in_front ? why : kInconsistent;
-    why = parallax ? why : low;
-    why = across_ok ? why : kInconsistent;
-    why = (wx == wx) & (wy == wy) & (sigma2 < 1e6F) ? why : kInconsistent;
-    why = inside ? why : kOutOfView;
-    why = gate[i] == kNoTexture ? kNoTexture : why;
-    why = aa >= k.blind2 ? why : low;
-    why = gate[i] == kOutOfView ? kOutOfView : why;
+    const bool has_flow = (wx == wx) & (wy == wy);
+    const Evidence e = {s + k.add_tz, aa, ad, sigma2, inside, parallax, across_ok, has_flow};
 
     const float inverse_aa = 1.0F / aa;
     // 1/Z has a symmetric error, Z has not: mean squared error under a log-uniform prior on depth, with
@@ -164,21 +215,11 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
       pose.reach += k.axis_variance;
     }
 
-    // The lower bound: the least |a| over the greatest parallax that are still likely.
-    const float reach = __builtin_sqrtf(aa);
-    const bool directed = aa >= kDirectionSigmas2 * pose.reach;
-    const float along = ad / reach;
-    const float seen = directed ? (along > 0.0F ? along : 0.0F) : __builtin_sqrtf(d2);
-    const float least = reach - k.bound_k * __builtin_sqrtf(pose.reach);
-    const float most = seen + k.bound_k * __builtin_sqrtf(sigma2 + pose.parallax);
-    const float nothing_before = least / most + k.add_tz;
-    const bool behind = directed & (ad < 0.0F) & parallax;
-    const bool bounded = (gate[i] == 0) & inside & (across_ok | !directed) & !behind & (sigma2 < 1e6F) &
-                         (least > 0.0F) & (nothing_before > 0.0F);
-    const float bound = bounded ? nothing_before : nan;
+    const float bound = bound_of(k, e, pose, d2, gate[i]);
+    std::int32_t why = state_of(k, e, gate[i]);
     why = (why == kLowParallax) & (bound >= k.range) ? kFar : why;
 
-    depth[i] = why == kMeasured ? z : nan;
+    depth[i] = why == kMeasured ? e.z : nan;
     own_variance[i] = why == kMeasured ? spread : nan;
     variance[i] = why == kMeasured ? spread + pose.depth : nan;
     bounds[i] = bound;
@@ -186,16 +227,9 @@ void row(const KernelParameters& parameters, const float* __restrict x_of, const
   }
 }
 
-template <KernelDerotation kDerotation, bool kSamelson, class... Rest>
-void choose(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
-            const Rest&... rest) {
-  if (sigma != nullptr) {
-    k.has_pose ? row<kDerotation, kSamelson, true, true>(k, x, y, flow, sigma, rest...)
-               : row<kDerotation, kSamelson, true, false>(k, x, y, flow, sigma, rest...);
-  } else {
-    k.has_pose ? row<kDerotation, kSamelson, false, true>(k, x, y, flow, sigma, rest...)
-               : row<kDerotation, kSamelson, false, false>(k, x, y, flow, sigma, rest...);
-  }
+template <KernelDerotation kDerotation, class... Rest>
+void choose(const KernelParameters& k, const Rest&... rest) {
+  k.has_pose ? row<kDerotation, true>(k, rest...) : row<kDerotation, false>(k, rest...);
 }
 
 /// kN > 0: a constant number of neighbours, which vectorises.
@@ -210,28 +244,23 @@ void sum_whole_windows(const float* __restrict in, std::size_t windows, int n, f
   }
 }
 
-template <KernelDerotation kDerotation, class... Rest>
-void choose_reading(const KernelParameters& k, const Rest&... rest) {
-  k.samelson ? choose<kDerotation, true>(k, rest...) : choose<kDerotation, false>(k, rest...);
-}
-
 }  // namespace
 
 void depth_row(const KernelParameters& k, const float* x, float y, const float* flow, const float* sigma,
                const std::uint8_t* gate, std::size_t count, const DepthRow& out) {
   switch (k.derotation) {
     case KernelDerotation::none:
-      return choose_reading<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, out.depth,
-                                                    out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::none>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                            out.own_variance, out.bound, out.state);
     case KernelDerotation::exact:
-      return choose_reading<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, out.depth,
-                                                     out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::exact>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                             out.own_variance, out.bound, out.state);
     case KernelDerotation::first_order:
-      return choose_reading<KernelDerotation::first_order>(
-          k, x, y, flow, sigma, gate, count, out.depth, out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::first_order>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                                   out.own_variance, out.bound, out.state);
     case KernelDerotation::remaining:
-      return choose_reading<KernelDerotation::remaining>(
-          k, x, y, flow, sigma, gate, count, out.depth, out.variance, out.own_variance, out.bound, out.state);
+      return choose<KernelDerotation::remaining>(k, x, y, flow, sigma, gate, count, out.depth, out.variance,
+                                                 out.own_variance, out.bound, out.state);
   }
 }
 

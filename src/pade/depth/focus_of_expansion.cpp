@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/core/random.hpp"
 
 namespace pade::depth {
@@ -27,12 +28,6 @@ Eigen::Vector2d normal_of(const FlowSample& s) { return Eigen::Vector2d(-s.flow.
 double across(const FlowSample& s, const Eigen::Vector2d& e) {
   const Eigen::Vector2d arm = s.position - e;
   return normal_of(s).dot(arm) / std::max(arm.norm(), 1.0);
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// The intersection of two flow vectors that most vectors agree with (least median): a start that neither

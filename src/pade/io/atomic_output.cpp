@@ -43,23 +43,67 @@ Result<fs::path> resolve(const fs::path& path) {
   return resolved;
 }
 
-Status write_bytes(const fs::path& path, const char* data, std::size_t size, int flags) {
-  const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC | flags, 0666);
-  if (file < 0) return os_error(path, "cannot be opened for writing", errno);
-  while (size > 0) {
-    const ssize_t written = ::write(file, data, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) {
-      const int reason = errno;
-      ::close(file);
-      return os_error(path, "cannot be written", reason);
-    }
-    data += written;
-    size -= static_cast<std::size_t>(written);
+/// A file that is being written, small pieces gathered to larger ones. The first error stays and ends it.
+class FileWriter {
+ public:
+  FileWriter(const fs::path& path, int flags)
+      : path_(path), file_(::open(path.c_str(), O_WRONLY | O_CLOEXEC | flags, 0666)) {
+    if (file_ < 0) status_ = os_error(path_, "cannot be opened for writing", errno);
   }
-  // Network file systems report a full disk only here.
-  if (::close(file) != 0) return os_error(path, "cannot be written", errno);
-  return {};
+  FileWriter(const FileWriter&) = delete;
+  FileWriter& operator=(const FileWriter&) = delete;
+  ~FileWriter() {
+    if (file_ >= 0) ::close(file_);
+  }
+
+  void add(std::string_view piece) {
+    constexpr std::size_t kGathered = 1 << 16;
+    if (gathered_.size() + piece.size() > kGathered) flush();
+    if (piece.size() > kGathered) {
+      put(piece);
+    } else {
+      gathered_ += piece;
+    }
+  }
+
+  Status close() {
+    flush();
+    // Network file systems report a full disk only here.
+    if (status_ && ::close(std::exchange(file_, -1)) != 0) fail();
+    return status_;
+  }
+
+ private:
+  void fail() { status_ = os_error(path_, "cannot be written", errno); }
+  void flush() {
+    put(gathered_);
+    gathered_.clear();
+  }
+  void put(std::string_view bytes) {
+    while (status_ && !bytes.empty()) {
+      const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+      if (written >= 0) {
+        bytes.remove_prefix(static_cast<std::size_t>(written));
+      } else if (errno != EINTR) {
+        fail();
+      }
+    }
+  }
+
+  const fs::path& path_;
+  int file_;
+  std::string gathered_;
+  Status status_;
+};
+
+Status write_bytes(const fs::path& path, const ByteSource& content, int flags) {
+  FileWriter file(path, flags);
+  content([&](std::string_view piece) { file.add(piece); });
+  return file.close();
+}
+
+ByteSource source_of(std::string_view content) {
+  return [content](const ByteSink& sink) { sink(content); };
 }
 
 // First of `path` and its parents that does not exist yet has an existing parent; that one is returned.
@@ -105,6 +149,12 @@ bool interrupted() { return interrupt_flag != 0; }
 Error interrupted_error() { return {"interrupted; nothing was written"}; }
 Error interrupted_and_kept_error() {
   return {"interrupted; what was finished is kept, and the same command goes on from there"};
+}
+
+std::string bytes_of(const ByteSource& source) {
+  std::string bytes;
+  source([&](std::string_view piece) { bytes += piece; });
+  return bytes;
 }
 
 Result<OutputFolder> OutputFolder::create(const fs::path& target, Overwrite overwrite,
@@ -170,10 +220,14 @@ Result<fs::path> OutputFolder::place(const fs::path& relative) const {
   return path;
 }
 
-Status OutputFolder::write(const fs::path& relative, std::string_view content) const {
+Status OutputFolder::write(const fs::path& relative, const ByteSource& content) const {
   const Result<fs::path> path = place(relative);
   if (!path) return path.error();
-  return write_bytes(*path, content.data(), content.size(), O_CREAT | O_TRUNC);
+  return write_bytes(*path, content, O_CREAT | O_TRUNC);
+}
+
+Status OutputFolder::write(const fs::path& relative, std::string_view content) const {
+  return write(relative, source_of(content));
 }
 
 Status OutputFolder::write(const fs::path& relative, std::span<const unsigned char> content) const {
@@ -207,10 +261,14 @@ Status OutputFolder::commit() {
 }
 
 Status write_file(const fs::path& path, std::string_view content, Overwrite overwrite) {
+  return write_file(path, source_of(content), overwrite);
+}
+
+Status write_file(const fs::path& path, const ByteSource& content, Overwrite overwrite) {
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
   if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
-    return write_bytes(path, content.data(), content.size(), 0);
+    return write_bytes(path, content, 0);
   }
   if (fs::is_directory(status)) {
     return Error{fmt::format("{}: found a folder, expected the name of a file", path.string())};
@@ -222,7 +280,7 @@ Status write_file(const fs::path& path, std::string_view content, Overwrite over
   const Result<fs::path> target = resolve(path);
   if (!target) return target.error();
   const fs::path temporary = temporary_beside(*target);
-  Status written = write_bytes(temporary, content.data(), content.size(), O_CREAT | O_EXCL);
+  Status written = write_bytes(temporary, content, O_CREAT | O_EXCL);
   if (written) {
     fs::rename(temporary, *target, code);
     if (code) written = os_error(*target, "cannot be put in place", code.value());

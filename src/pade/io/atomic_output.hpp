@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -10,6 +11,13 @@
 #include "pade/core/result.hpp"
 
 namespace pade::io {
+
+/// Takes the bytes of a file piece by piece, in order.
+using ByteSink = std::function<void(std::string_view)>;
+/// Gives the bytes of a file to a sink, so that a large one is never held whole.
+using ByteSource = std::function<void(const ByteSink&)>;
+/// All bytes of a source in one string.
+std::string bytes_of(const ByteSource& source);
 
 /// What to do if the output exists already.
 enum class Overwrite {
@@ -55,8 +63,11 @@ class OutputFolder {
   Result<std::filesystem::path> place(const std::filesystem::path& relative) const;
   /// Writes a file of the folder; every byte is checked.
   Status write(const std::filesystem::path& relative, std::string_view content) const;
-  /// The same for bytes.
+  /// @{
+  /// The same for bytes, and for bytes piece by piece.
   Status write(const std::filesystem::path& relative, std::span<const unsigned char> content) const;
+  Status write(const std::filesystem::path& relative, const ByteSource& content) const;
+  /// @}
 
   /// Moves the folder to its place, replacing an old one in one step if the file system can.
   Status commit();
@@ -74,5 +85,7 @@ class OutputFolder {
 /// Writes a single file beside its place and renames it. `path` may be a device such as /dev/stdout, which is
 /// written to directly.
 Status write_file(const std::filesystem::path& path, std::string_view content, Overwrite overwrite);
+/// The same piece by piece.
+Status write_file(const std::filesystem::path& path, const ByteSource& content, Overwrite overwrite);
 
 }  // namespace pade::io

@@ -1,8 +1,9 @@
 // One point cloud from the depth images of a flight, thinned to what a person or a program can use.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <unordered_map>
+#include <vector>
 
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
@@ -30,6 +31,20 @@ struct CloudOptions {
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const CloudOptions& options);
 
+/// Where in a list the thing of a cube is: a hash table of 12 to 24 bytes per cube.
+class CubeIndex {
+ public:
+  /// The place of `cube`; that after the last where it has none, which is its place from then on.
+  std::size_t place_of(std::uint64_t cube);
+
+ private:
+  [[nodiscard]] std::size_t slot_of(std::uint64_t cube) const;
+  void grow();
+
+  std::vector<std::uint64_t> cubes_;  // by place
+  std::vector<std::uint32_t> slots_;  // place plus one; 0 = empty
+};
+
 /// Keeps, of each small cube of space, the point with the least sigma. The order is that in which cubes were
 /// first seen, so that the same images give the same cloud.
 class CloudBuilder {
@@ -46,7 +61,7 @@ class CloudBuilder {
  private:
   CloudOptions options_;
   PointCloud cloud_;
-  std::unordered_map<std::uint64_t, std::size_t> index_;  // cube -> place in cloud_
+  CubeIndex index_;  // places in cloud_
 };
 
 }  // namespace pade::mapping

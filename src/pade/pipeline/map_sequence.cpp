@@ -95,8 +95,10 @@ class Run {
     truths_[frame.time] = std::move(loaded.truth);
     while (truths_.size() > step() + 1) truths_.erase(truths_.begin());
 
+    const double cpu_before = io::thread_cpu_seconds();
     const MapperUpdate& update =
         mapper_.add(frame.image, frame.time, frame.T_world_camera, frame.motion_covariance);
+    stages_cpu_ += io::thread_cpu_seconds() - cpu_before;
     if (update.outcome == MapperUpdate::Outcome::skipped) {
       undecodable_.push_back({sequence_.image_file(i).string(), update.reason});
       return sequence_.check(undecodable_.size());
@@ -118,14 +120,19 @@ class Run {
             sequence_.skipped().size() + undecodable_.size()};
   }
 
-  Result<MapResult> finish(double seconds) {
+  /// The page shows the time and memory until then, timing.json those of everything that is written.
+  Result<MapResult> finish(std::chrono::steady_clock::time_point started) {
     MapResult result;
     result.info = writer_.completed(info());
     result.info.hints = evaluation::hints_of(result.info);
-    result.timing = timing(seconds);
     if (!accuracy_.empty()) result.accuracy = accuracy_.result();
     if (Status status = write(result); !status) return status.error();
-    if (Status status = writer_.finish(result.info, result.timing); !status) return status.error();
+    if (options_.report) {
+      result.timing = timing(started);
+      if (Status status = writer_.write("report.html", report(result)); !status) return status.error();
+    }
+    const auto last = [&] { return result.timing = timing(started); };
+    if (Status status = writer_.finish(result.info, last); !status) return status.error();
     return result;
   }
 
@@ -185,13 +192,16 @@ class Run {
     return info;
   }
 
-  [[nodiscard]] io::RunTiming timing(double seconds) const {
+  [[nodiscard]] io::RunTiming timing(std::chrono::steady_clock::time_point started) const {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     io::RunTiming timing;
     for (std::size_t stage = 0; stage < stage_names.size(); ++stage) {
       timing.stages.push_back(io::summarise(stage_names[stage], milliseconds_[stage]));
     }
     timing.frames_per_second = seconds > 0 ? static_cast<double>(used_) / seconds : 0;
     timing.peak_memory = io::peak_memory();
+    timing.cpu_seconds = io::cpu_seconds();
+    timing.stages_cpu_seconds = stages_cpu_;
     return timing;
   }
 
@@ -202,27 +212,26 @@ class Run {
                                   ? world
                                   : fmt::format("{}\nlocal origin {} {} {}: add it to get back to that frame",
                                                 world, shift.x(), shift.y(), shift.z());
-    std::vector<std::pair<std::string, std::string>> files = {
-        {"cloud.ply", io::encode_ply(cloud_.cloud(), frame)},
-        {"map.bt", io::encode_map(mapper_.map(), io::MapFormat::bt)},
-        {"map.ot", io::encode_map(mapper_.map(), io::MapFormat::ot)},
-        {"map.json", io::encode_side_car(options_.mapper.map, result.info.origin, shift)},
+    // One after the other, so that no two of them are held at a time.
+    Status status;
+    const auto write = [&](const char* name, const auto& content) {
+      if (status) status = writer_.write(name, content);
     };
-    if (options_.pcd) files.emplace_back("cloud.pcd", io::encode_pcd(cloud_.cloud(), frame));
+    write("cloud.ply", io::encode_ply(cloud_.cloud(), frame));
+    write("map.bt", io::encode_map(mapper_.map(), io::MapFormat::bt));
+    write("map.ot", io::encode_map(mapper_.map(), io::MapFormat::ot));
+    write("map.json", io::encode_side_car(options_.mapper.map, result.info.origin, shift));
+    if (options_.pcd) write("cloud.pcd", io::encode_pcd(cloud_.cloud(), frame));
     if (options_.world_coordinates) {
-      files.emplace_back("cloud_world.ply", io::encode_ply(cloud_.cloud(), world, shift));
-      files.emplace_back("trajectory_world.txt", io::format_trajectory(world_path_));
-      if (options_.pcd) files.emplace_back("cloud_world.pcd", io::encode_pcd(cloud_.cloud(), world, shift));
+      write("cloud_world.ply", io::encode_ply(cloud_.cloud(), world, shift));
+      write("trajectory_world.txt", io::format_trajectory(world_path_));
+      if (options_.pcd) write("cloud_world.pcd", io::encode_pcd(cloud_.cloud(), world, shift));
     }
     if (result.accuracy) {
-      files.emplace_back("evaluation.json", evaluation::to_json(*result.accuracy));
-      files.emplace_back("evaluation.csv", evaluation::to_csv(*result.accuracy));
+      write("evaluation.json", evaluation::to_json(*result.accuracy));
+      write("evaluation.csv", evaluation::to_csv(*result.accuracy));
     }
-    if (options_.report) files.emplace_back("report.html", report(result));
-    for (const auto& [name, content] : files) {
-      if (Status status = writer_.write(name, content); !status) return status;
-    }
-    return {};
+    return status;
   }
 
   std::string report(const MapResult& result) {
@@ -245,6 +254,7 @@ class Run {
   std::vector<io::StampedPose> world_path_;         // where options_.world_coordinates
   Eigen::Vector3d look_ = Eigen::Vector3d::Zero();  // optical axis at the last pose
   std::array<std::vector<double>, stage_names.size()> milliseconds_;
+  double stages_cpu_ = 0;  // s
   std::size_t used_ = 0;
 };
 
@@ -280,19 +290,19 @@ Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const Ma
 
 Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,
                                io::RunWriter& writer, int threads,
-                               const std::function<bool(const MapProgress&)>& progress) {
+                               const std::function<bool(const MapProgress&)>& progress,
+                               std::chrono::steady_clock::time_point started) {
   if (const Status status = check(options); !status) return status.error();
   auto mapper = ObstacleMapper::create(sequence.camera(), options.mapper, sequence.mask());
   if (!mapper) return mapper.error();
 
-  const auto start = std::chrono::steady_clock::now();
   Run run(sequence, options, writer, std::move(mapper).value());
   Reader reader(sequence, threads > 1);
   for (std::size_t i = 0; i < sequence.size(); ++i) {
     if (Status status = run.add(i, reader.next()); !status) return status.error();
     if (progress && !progress(run.progress(i + 1))) return io::interrupted_error();
   }
-  return run.finish(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  return run.finish(started);
 }
 
 }  // namespace pade

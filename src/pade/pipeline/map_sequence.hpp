@@ -1,6 +1,7 @@
 // A recorded flight through the obstacle mapper into the folder of a run: what `pade map` does.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <string_view>
@@ -72,8 +73,10 @@ struct MapResult {
 /// @param threads   1: everything on the calling thread. 2: the next frame is read ahead. Same bytes either
 /// way.
 /// @param progress  called after every frame; false stops the run with io::interrupted_error(). May be empty.
-Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,
-                               io::RunWriter& writer, int threads,
-                               const std::function<bool(const MapProgress&)>& progress = {});
+/// @param started   when the user began to wait: the run's frames per second count from there
+Result<MapResult> map_sequence(
+    const io::Sequence& sequence, const MapSequenceOptions& options, io::RunWriter& writer, int threads,
+    const std::function<bool(const MapProgress&)>& progress = {},
+    std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now());
 
 }  // namespace pade

@@ -4,18 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "pade/core/compute/median.hpp"
+
 namespace pade {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-
-/// 0 where there is none; of an even number the upper one of the middle two.
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// σ of the direction of translation, per axis, degrees: what the covariance says across it.
 double direction_sigma(const RelativeMotion& motion) {
@@ -74,7 +68,8 @@ io::MapSummary RunTally::map_summary(const mapping::OccupancyMap& map) const {
 }
 
 io::MotionSummary RunTally::motion_summary() const {
-  return {baselines_.size(), still_, median(baselines_), median(rotation_sigmas_), median(direction_sigmas_)};
+  const auto middle = [](std::vector<double> values) { return median(values, 0); };
+  return {baselines_.size(), still_, middle(baselines_), middle(rotation_sigmas_), middle(direction_sigmas_)};
 }
 
 }  // namespace pade

@@ -20,8 +20,7 @@ namespace {
 
 constexpr double kAligned = 0.9998;  // cosine of about a degree
 
-// Three axes of the views: two horizontal ones and up, right-handed, with their names.
-struct Axes {
+struct Axes {  // of the views: two horizontal ones and up, right-handed, with their names
   std::array<Eigen::Vector3d, 3> direction;
   std::array<std::string, 3> name;
 };
@@ -84,6 +83,15 @@ Points along(const std::vector<Eigen::Vector3d>& vectors, const Axes& axes) {
   return points;
 }
 
+/// Of a long path as many points as a picture can show, the first and the last among them.
+Points thinned(Points path) {
+  constexpr std::size_t kMost = 2000;
+  if (path.size() <= kMost) return path;
+  for (std::size_t i = 0; i < kMost; ++i) path[i] = path[i * (path.size() - 1) / (kMost - 1)];
+  path.resize(kMost);
+  return path;
+}
+
 /// What the views show of an axis: all voxels but the outermost few, and the path.
 Interval bounds(const Points& voxels, const Points& path, std::size_t axis) {
   std::vector<double> values;
@@ -101,14 +109,13 @@ Interval bounds(const Points& voxels, const Points& path, std::size_t axis) {
   return interval;
 }
 
-// On the grid of the map's voxels, so that each row of voxels fills one row of pixels.
+// On the grid of the voxels, so that each row of them fills one row of pixels.
 Interval snapped(const Interval& interval, double voxel, double margin) {
   return {std::floor((interval.from - margin) / voxel) * voxel,
           std::ceil((interval.to + margin) / voxel) * voxel};
 }
 
-// What the views share.
-struct Scene {
+struct Scene {  // what the views share
   const MapScene& map;
   const Axes& axes;
   const Points& voxels;
@@ -130,9 +137,9 @@ DrawingAxis drawing_axis(const Scene& scene, const Across& across) {
                          : DrawingAxis{interval.from, interval.to, name};
 }
 
-/// Pixel of a value on an axis of `cells` pixels of a voxel each.
-int pixel_on(const DrawingAxis& axis, double value, double voxel, int cells) {
-  const double from_start = std::abs(value - axis.from) / voxel;
+/// Pixel of a value on an axis of `cells` pixels of `step` metres each.
+int pixel_on(const DrawingAxis& axis, double value, double step, int cells) {
+  const double from_start = std::abs(value - axis.from) / step;
   return std::clamp(static_cast<int>(from_start), 0, cells - 1);
 }
 
@@ -140,18 +147,26 @@ int cells_of(const DrawingAxis& axis, double step) {
   return std::max(1, static_cast<int>(std::lround(axis.length() / step)));
 }
 
-// One voxel per pixel; of several along the line of sight the one nearest to the viewer, who looks against
-// `sign` times the axis `toward`.
+/// Metres per pixel of a picture of `length` metres: a voxel, or several where there would be too many
+/// pixels.
+double pixel_size(double length, double voxel) {
+  constexpr double kLargest = 1400;
+  return voxel * std::max(1.0, std::ceil(length / voxel / kLargest));
+}
+
+// Of several voxels in a pixel the one nearest to the viewer, who looks against `sign` times the axis
+// `toward`.
 cv::Mat heights_of(const Scene& scene, const DrawingAxis& across, std::size_t across_axis,
                    const DrawingAxis& upward, std::size_t upward_axis, double sign) {
   const std::size_t toward = 3 - across_axis - upward_axis;
-  const cv::Size size(cells_of(across, scene.voxel), cells_of(upward, scene.voxel));
+  const double step = pixel_size(std::max(across.length(), upward.length()), scene.voxel);
+  const cv::Size size(cells_of(across, step), cells_of(upward, step));
   cv::Mat heights(size, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   cv::Mat nearest(size, CV_64FC1, cv::Scalar(-std::numeric_limits<double>::infinity()));
   for (const auto& point : scene.voxels) {
     if (!scene.box[0].has(point[0]) || !scene.box[1].has(point[1]) || !scene.box[2].has(point[2])) continue;
-    const int x = pixel_on(across, point[across_axis], scene.voxel, size.width);
-    const int y = size.height - 1 - pixel_on(upward, point[upward_axis], scene.voxel, size.height);
+    const int x = pixel_on(across, point[across_axis], step, size.width);
+    const int y = size.height - 1 - pixel_on(upward, point[upward_axis], step, size.height);
     if (sign * point[toward] <= nearest.at<double>(y, x)) continue;
     nearest.at<double>(y, x) = sign * point[toward];
     heights.at<float>(y, x) = static_cast<float>(point[2]);
@@ -174,13 +189,6 @@ Drawing projection(const Scene& scene, const Across& across, const Across& upwar
                 scene.box[2].from, scene.box[2].to, Palette::cividis);
   drawing.path = line_of(scene.path, across.axis, upward.axis);
   return drawing;
-}
-
-/// Metres per pixel of a picture of `length` metres: a voxel, or several where there would be too many
-/// pixels.
-double pixel_size(double length, double voxel) {
-  constexpr double kLargest = 1400;
-  return voxel * std::max(1.0, std::ceil(length / voxel / kLargest));
 }
 
 /// Height of the path where it comes nearest to a place on the ground.
@@ -338,7 +346,7 @@ MapViews draw_map(const MapScene& map) {
   MapViews views;
   const Axes axes = axes_of(map.up);
   const Points voxels = occupied_voxels(map.map, axes);
-  const Points path = along(map.trajectory, axes);
+  const Points path = thinned(along(map.trajectory, axes));
   const Points shown = voxels.empty() ? corners_of_known(map.map, axes) : voxels;
   if (shown.empty() || path.empty()) return views;
   const double voxel = map.map.options().voxel;

@@ -34,14 +34,20 @@ TEST_P(CloudFile, IsRefusedWhenCutAnywhere) {
   EXPECT_FALSE(GetParam().decode(whole + "x", "cloud").ok());
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Of, CloudFile,
-    testing::Values(
-        Format{"Ply", [](const PointCloud& cloud) { return encode_ply(cloud, "world: +z is up\nunits: m"); },
-               decode_ply},
-        Format{"Pcd", [](const PointCloud& cloud) { return encode_pcd(cloud, "world: +z is up\nunits: m"); },
-               decode_pcd}),
-    [](const auto& instance) { return instance.param.name; });
+INSTANTIATE_TEST_SUITE_P(Of, CloudFile,
+                         testing::Values(Format{"Ply",
+                                                [](const PointCloud& cloud) {
+                                                  return bytes_of(
+                                                      encode_ply(cloud, "world: +z is up\nunits: m"));
+                                                },
+                                                decode_ply},
+                                         Format{"Pcd",
+                                                [](const PointCloud& cloud) {
+                                                  return bytes_of(
+                                                      encode_pcd(cloud, "world: +z is up\nunits: m"));
+                                                },
+                                                decode_pcd}),
+                         [](const auto& instance) { return instance.param.name; });
 
 }  // namespace
 }  // namespace pade::io

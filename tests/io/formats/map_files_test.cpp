@@ -91,22 +91,22 @@ TEST_P(MapFile, IsReadByTheToolsOfOctoMap) {
 }
 
 TEST_P(MapFile, ReadsBackToTheSameSpaceAndTheSameBytes) {
-  const std::string content = encode_map(flown(), format());
+  const std::string content = io::bytes_of(encode_map(flown(), format()));
   const auto map = decode_map(content, "map");
   ASSERT_TRUE(map.ok()) << map.error().message;
   expect_same_space(flown(), map->tree());
-  EXPECT_EQ(encode_map(*map, format()), content);
+  EXPECT_EQ(io::bytes_of(encode_map(*map, format())), content);
 }
 
 TEST_P(MapFile, OfAnEmptyMapReadsBackEmpty) {
   const OccupancyMap empty = std::move(OccupancyMap::create()).value();
-  const auto map = decode_map(encode_map(empty, format()), "map");
+  const auto map = decode_map(io::bytes_of(encode_map(empty, format())), "map");
   ASSERT_TRUE(map.ok()) << map.error().message;
   EXPECT_EQ(map->counts().free + map->counts().occupied, 0U);
 }
 
 TEST_P(MapFile, CutShortAnywhereIsAnErrorAndNeverPartOfAMap) {
-  const std::string content = encode_map(flown(), format());
+  const std::string content = io::bytes_of(encode_map(flown(), format()));
   std::mt19937 random(1);
   std::uniform_int_distribution<std::size_t> where(0, content.size() - 1);
   for (int i = 0; i < 300; ++i) {
@@ -119,7 +119,7 @@ TEST_P(MapFile, CutShortAnywhereIsAnErrorAndNeverPartOfAMap) {
 }
 
 TEST_P(MapFile, WithChangedBytesIsAnErrorOrAMapButNeverACrash) {
-  const std::string content = encode_map(flown(), format());
+  const std::string content = io::bytes_of(encode_map(flown(), format()));
   std::mt19937 random(2);
   std::uniform_int_distribution<std::size_t> where(0, content.size() - 1);
   std::uniform_int_distribution<int> byte(0, 255);

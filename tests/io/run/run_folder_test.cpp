@@ -90,7 +90,7 @@ Status write_run(const fs::path& folder, cv::Size size, std::string_view save, c
   flow.vectors.at<cv::Vec2f>(0, 0) = {kNaN, 0};
   if (Status status = writer->add(depth, flow); !status) return status;
   writer->add_pose(depth.time, Pose{});
-  return writer->finish(some_info(size), some_timing());
+  return writer->finish(some_info(size), some_timing);
 }
 
 class RunFolder : public testing::TestWithParam<int> {};

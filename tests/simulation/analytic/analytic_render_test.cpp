@@ -77,7 +77,7 @@ TEST_P(ExactFlowOf, LeadsBackWhereThePointIsVisible) {
 TEST_P(ExactFlowOf, WarpsTheNextImageOntoThisOneUpToNoise) {
   const AnalyticFlight flight = *make_analytic_flight(GetParam(), 2, analytic_camera(320, 240));
   const Camera& camera = flight.camera;
-  RenderOptions options;
+  AnalyticRenderOptions options;
   options.threads = 2;
   const cv::Mat first = render_image(flight.scene, camera, flight.T_world_camera[0], options);
   const cv::Mat second = render_image(flight.scene, camera, flight.T_world_camera[1], options);
@@ -139,7 +139,7 @@ TEST(ExactFlow, HidesPointsThatPassBehindAnother) {
 
 TEST(Rendering, IsTheSameForAnyNumberOfThreads) {
   const AnalyticFlight flight = *make_analytic_flight("courtyard", 2, kSmall);
-  RenderOptions options;
+  AnalyticRenderOptions options;
   options.noise_sigma = 2;
   options.noise_seed = 5;
   const cv::Mat one = render_image(flight.scene, kSmall, flight.T_world_camera[1], options);
@@ -153,7 +153,7 @@ TEST(Rendering, IsTheSameForAnyNumberOfThreads) {
 TEST(Rendering, NoiseHasTheStandardDeviationThatWasAskedForAndDiffersBetweenSeeds) {
   const AnalyticFlight flight = *make_analytic_flight("forward", 1);
   const Pose& pose = flight.T_world_camera[0];
-  RenderOptions options;
+  AnalyticRenderOptions options;
   options.threads = 2;
   const cv::Mat clean = render_image(flight.scene, flight.camera, pose, options);
   options.noise_sigma = 3;

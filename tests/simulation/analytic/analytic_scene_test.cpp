@@ -106,7 +106,7 @@ TEST(AnalyticScene, SignedDistanceHasUnitGradientOutsideAndVanishesOnTheSurface)
 TEST(AnalyticScene, ASolidThatOverlapsAnotherIsSolidThroughout) {
   AnalyticScene scene;
   scene.add("ground", HalfSpace{});
-  scene.add("box", Box{{Eigen::Quaterniond::Identity(), {0, 0, 0.5}}, {1, 1, 1}});
+  scene.add("box", AnalyticBox{{Eigen::Quaterniond::Identity(), {0, 0, 0.5}}, {1, 1, 1}});
   EXPECT_TRUE(scene.inside_solid({0, 0, 0.1}));
   EXPECT_TRUE(scene.inside_solid({0, 0, -0.1}));
   EXPECT_TRUE(scene.inside_solid({5, 0, -0.1}));

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -74,19 +76,23 @@ void put_position(std::string& bytes, const CloudPoint& point, const std::option
 
 }  // namespace
 
-std::string encode_ply(const PointCloud& cloud, std::string_view comment,
-                       const std::optional<Eigen::Vector3d>& shift) {
-  std::string bytes(kPlyStart);
-  while (!comment.empty()) bytes += fmt::format("comment {}\n", next_line(comment));
-  bytes +=
+ByteSource encode_ply(const PointCloud& cloud, std::string_view comment,
+                      const std::optional<Eigen::Vector3d>& shift) {
+  std::string header(kPlyStart);
+  while (!comment.empty()) header += fmt::format("comment {}\n", next_line(comment));
+  header +=
       fmt::format("element vertex {}\n{}", cloud.size(), shift ? kPlyPropertiesOfDoubles : kPlyProperties);
-  bytes.reserve(bytes.size() + cloud.size() * kPlyPointBytes);
-  for (const CloudPoint& point : cloud) {
-    put_position(bytes, point, shift);
-    put(bytes, point.colour);
-    put(bytes, point.sigma);
-  }
-  return bytes;
+  return [header = std::move(header), &cloud, shift](const ByteSink& sink) {
+    sink(header);
+    std::string bytes;
+    for (const CloudPoint& point : cloud) {
+      bytes.clear();
+      put_position(bytes, point, shift);
+      put(bytes, point.colour);
+      put(bytes, point.sigma);
+      sink(bytes);
+    }
+  };
 }
 
 Result<PointCloud> decode_ply(std::string_view content, std::string_view file) {
@@ -116,21 +122,25 @@ Result<PointCloud> decode_ply(std::string_view content, std::string_view file) {
   return cloud;
 }
 
-std::string encode_pcd(const PointCloud& cloud, std::string_view comment,
-                       const std::optional<Eigen::Vector3d>& shift) {
-  std::string bytes(kPcdStart);
-  while (!comment.empty()) bytes += fmt::format("# {}\n", next_line(comment));
-  bytes += shift ? kPcdFieldsOfDoubles : kPcdFields;
-  bytes +=
+ByteSource encode_pcd(const PointCloud& cloud, std::string_view comment,
+                      const std::optional<Eigen::Vector3d>& shift) {
+  std::string header(kPcdStart);
+  while (!comment.empty()) header += fmt::format("# {}\n", next_line(comment));
+  header += shift ? kPcdFieldsOfDoubles : kPcdFields;
+  header +=
       fmt::format("WIDTH {0}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA binary\n", cloud.size());
-  bytes.reserve(bytes.size() + cloud.size() * kPcdPointBytes);
-  for (const CloudPoint& point : cloud) {
-    const auto& [red, green, blue] = point.colour;
-    put_position(bytes, point, shift);
-    put(bytes, static_cast<std::uint32_t>(red << 16 | green << 8 | blue));
-    put(bytes, point.sigma);
-  }
-  return bytes;
+  return [header = std::move(header), &cloud, shift](const ByteSink& sink) {
+    sink(header);
+    std::string bytes;
+    for (const CloudPoint& point : cloud) {
+      const auto& [red, green, blue] = point.colour;
+      bytes.clear();
+      put_position(bytes, point, shift);
+      put(bytes, static_cast<std::uint32_t>(red << 16 | green << 8 | blue));
+      put(bytes, point.sigma);
+      sink(bytes);
+    }
+  };
 }
 
 Result<PointCloud> decode_pcd(std::string_view content, std::string_view file) {

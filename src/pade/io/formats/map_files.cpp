@@ -1,5 +1,6 @@
 #include "pade/io/formats/map_files.hpp"
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -144,25 +145,92 @@ class StructureCheck {
   bool not_finite_ = false;
 };
 
+/// A node of an .ot file and all below it.
+void put_full(const octomap::OcTree& tree, const octomap::OcTreeNode& node, const ByteSink& sink) {
+  const float log_odds = node.getLogOdds();
+  std::array<char, sizeof log_odds + 1> bytes{};
+  std::memcpy(bytes.data(), &log_odds, sizeof log_odds);
+  unsigned children = 0;
+  for (unsigned i = 0; i < 8; ++i) children |= tree.nodeChildExists(&node, i) ? 1U << i : 0U;
+  bytes.back() = static_cast<char>(children);
+  sink({bytes.data(), bytes.size()});
+  for (unsigned i = 0; i < 8; ++i) {
+    if ((children >> i & 1U) != 0) put_full(tree, *tree.getNodeChild(&node, i), sink);
+  }
+}
+
+/// The inner nodes of a .bt file: each leaf free or occupied, eight equal leaves one.
+class BinaryNodes {
+ public:
+  explicit BinaryNodes(const octomap::OcTree& tree) : tree_(tree) {}
+
+  void add_root(const octomap::OcTreeNode& root) {
+    nodes_ = 1;
+    put_children(root);
+  }
+  [[nodiscard]] std::size_t nodes() const { return nodes_; }
+  [[nodiscard]] const std::string& bytes() const { return bytes_; }
+
+ private:
+  static constexpr unsigned kInner = 3;
+
+  /// What its parent says of a node: 1 free, 2 occupied, 3 inner.
+  unsigned kind_of(const octomap::OcTreeNode& node) {
+    ++nodes_;
+    if (!tree_.nodeHasChildren(&node)) return tree_.isNodeOccupied(node) ? 2 : 1;
+    const std::size_t start = bytes_.size();
+    const std::size_t nodes = nodes_;
+    const unsigned children = put_children(node);
+    constexpr unsigned kAllFree = 0x5555, kAllOccupied = 0xAAAA;
+    if (children != kAllFree && children != kAllOccupied) return kInner;
+    bytes_.resize(start);
+    nodes_ = nodes;
+    return children == kAllFree ? 1 : 2;
+  }
+
+  unsigned put_children(const octomap::OcTreeNode& node) {
+    const std::size_t start = bytes_.size();
+    bytes_.append(2, '\0');
+    unsigned children = 0;
+    if (tree_.nodeHasChildren(&node)) {
+      for (unsigned i = 0; i < 8; ++i) {
+        if (tree_.nodeChildExists(&node, i)) children |= kind_of(*tree_.getNodeChild(&node, i)) << (2 * i);
+      }
+    }
+    bytes_[start] = static_cast<char>(children & 255U);
+    bytes_[start + 1] = static_cast<char>(children >> 8U);
+    return children;
+  }
+
+  const octomap::OcTree& tree_;
+  std::string bytes_;
+  std::size_t nodes_ = 0;
+};
+
 }  // namespace
 
-std::string encode_map(const mapping::OccupancyMap& map, MapFormat format) {
-  // The header is written here, since OctoMap's is in the locale of the stream and writes res with six
-  // digits.
-  octomap::OcTree tree(map.tree());
-  std::ostringstream data;
-  if (format == MapFormat::bt) {
-    tree.toMaxLikelihood();
-    tree.prune();
-    if (tree.size() > 0) tree.writeBinaryData(data);
-  } else if (tree.size() > 0) {
-    tree.writeData(data);
-  }
-  return fmt::format(
-             "{}\n# (feel free to add / change comments, but leave the first line as it is!)\n#\nid OcTree\n"
-             "size {}\nres {}\ndata\n",
-             format == MapFormat::bt ? kMagicBinary : kMagicFull, tree.size(), tree.getResolution()) +
-         data.str();
+ByteSource encode_map(const mapping::OccupancyMap& map, MapFormat format) {
+  // Written here, since OctoMap's header is in the locale of the stream and gives res with six digits, and
+  // its binary file needs a second tree.
+  return [&map, format](const ByteSink& sink) {
+    const octomap::OcTree& tree = map.tree();
+    const octomap::OcTreeNode* root = tree.getRoot();
+    const auto header = [&](std::string_view magic, std::size_t nodes) {
+      sink(fmt::format(
+          "{}\n# (feel free to add / change comments, but leave the first line as it is!)\n#\nid OcTree\n"
+          "size {}\nres {}\ndata\n",
+          magic, nodes, tree.getResolution()));
+    };
+    if (format == MapFormat::bt) {
+      BinaryNodes binary(tree);
+      if (root != nullptr) binary.add_root(*root);
+      header(kMagicBinary, binary.nodes());
+      sink(binary.bytes());
+    } else {
+      header(kMagicFull, tree.size());
+      if (root != nullptr) put_full(tree, *root, sink);
+    }
+  };
 }
 
 Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_view file,

@@ -20,8 +20,8 @@ enum class MapFormat {
   ot,  ///< log-odds per voxel
 };
 
-/// The content of a map file. Same map, same bytes.
-std::string encode_map(const mapping::OccupancyMap& map, MapFormat format);
+/// The content of a map file. Same map, same bytes. The map must outlive what is returned.
+ByteSource encode_map(const mapping::OccupancyMap& map, MapFormat format);
 
 /// Reads the content of a map file of either format; `file` is the name in messages. The whole structure is
 /// checked before anything is built: a file that was cut short or is no octree gives an error, never a part

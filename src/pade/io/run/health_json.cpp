@@ -5,100 +5,75 @@
 #include "pade/io/run/run_fields.hpp"
 
 namespace pade::io {
-
 namespace {
+
 using Json = nlohmann::ordered_json;
+
+constexpr auto navigation_fields = [](auto& health, auto&& field) {
+  auto& filter = health.filter;
+  field("status", filter.status, "a status");
+  field("frames", health.frames, "a count");
+  field("frames_without_answer", health.frames_without_answer, "a count");
+  field("frames_lost", health.frames_lost, "a count");
+  field("speed_median_m_s", health.speed_median, "m/s");
+  field("speed_largest_m_s", health.speed_largest, "m/s");
+  field("imu_refused", filter.imu_refused, "a count");
+  field("imu_gaps", filter.imu_gaps, "a count");
+  field("measurements_too_late", filter.too_late, "a count");
+  field("measurements_repeated", filter.duplicates, "a count");
+  field("measurements_unusable", filter.unusable, "a count");
+  field("restarts", filter.restarts, "a count");
+  field("restarts_when_lost", filter.restarts_when_lost, "a count");
+  field("times_lost", filter.times_lost, "a count");
+  field("velocity_doubted", filter.velocity_doubted, "a count");
+};
+constexpr auto sensor_fields = [](auto& sensor, auto&& field) {
+  field("sensor", sensor.sensor, "a name");
+  field("measurements", sensor.measurements, "a count");
+  field("refused", sensor.refused, "a count");
+  field("chi_square_per_component", sensor.chi_square, "a number");
+};
+constexpr auto run_fields = [](auto& health, auto&& field) {
+  field("frames", health.frames, "a whole number");
+  field("frames_used", health.frames_used, "a whole number");
+  field("depth_images", health.depth_images, "a whole number");
+  field("frames_without_pose", health.frames_without_pose, "a whole number");
+  field("motions_without_scale", health.motions_without_scale, "a whole number");
+};
+constexpr auto skipped_fields = [](auto& skipped, auto&& field) {
+  field("file", skipped.file, "text");
+  field("reason", skipped.reason, "text");
+};
+
 }  // namespace
 
 Json json_of(const NavigationHealth& health) {
-  const navigation::Health& filter = health.filter;
-  Json sensors = Json::array();
+  Json json = json_by(navigation_fields, health);
+  Json& sensors = json["sensors"] = Json::array();
   for (const navigation::SensorSummary& sensor : health.sensors) {
-    sensors.push_back({{"sensor", sensor.sensor},
-                       {"measurements", sensor.measurements},
-                       {"refused", sensor.refused},
-                       {"chi_square_per_component", sensor.chi_square}});
+    sensors.push_back(json_by(sensor_fields, sensor));
   }
-  return {{"status", to_name(filter.status)},
-          {"frames", health.frames},
-          {"frames_without_answer", health.frames_without_answer},
-          {"frames_lost", health.frames_lost},
-          {"speed_median_m_s", health.speed_median},
-          {"speed_largest_m_s", health.speed_largest},
-          {"imu_refused", filter.imu_refused},
-          {"imu_gaps", filter.imu_gaps},
-          {"measurements_too_late", filter.too_late},
-          {"measurements_repeated", filter.duplicates},
-          {"measurements_unusable", filter.unusable},
-          {"restarts", filter.restarts},
-          {"restarts_when_lost", filter.restarts_when_lost},
-          {"times_lost", filter.times_lost},
-          {"velocity_doubted", filter.velocity_doubted},
-          {"sensors", std::move(sensors)}};
+  return json;
 }
 
 Json json_of(const RunHealth& health) {
-  Json skipped = Json::array();
-  for (const Skipped& item : health.skipped)
-    skipped.push_back({{"file", item.file}, {"reason", item.reason}});
-  Json json = {{"frames", health.frames},
-               {"frames_used", health.frames_used},
-               {"depth_images", health.depth_images},
-               {"frames_without_pose", health.frames_without_pose},
-               {"motions_without_scale", health.motions_without_scale},
-               {"skipped", std::move(skipped)},
-               {"warnings", health.warnings}};
+  Json json = json_by(run_fields, health);
+  Json& skipped = json["skipped"] = Json::array();
+  for (const Skipped& item : health.skipped) skipped.push_back(json_by(skipped_fields, item));
+  json["warnings"] = health.warnings;
   if (health.navigation) json["navigation"] = json_of(*health.navigation);
   return json;
 }
 
-namespace {
-
-void read_navigation(RunFields fields, NavigationHealth& health) {
-  navigation::Health& filter = health.filter;
-  fields.read("status", filter.status, "a status");
-  fields.read("frames", health.frames, "a count");
-  fields.read("frames_without_answer", health.frames_without_answer, "a count");
-  fields.read("frames_lost", health.frames_lost, "a count");
-  fields.read("speed_median_m_s", health.speed_median, "m/s");
-  fields.read("speed_largest_m_s", health.speed_largest, "m/s");
-  fields.read("imu_refused", filter.imu_refused, "a count");
-  fields.read("imu_gaps", filter.imu_gaps, "a count");
-  fields.read("measurements_too_late", filter.too_late, "a count");
-  fields.read("measurements_repeated", filter.duplicates, "a count");
-  fields.read("measurements_unusable", filter.unusable, "a count");
-  fields.read("restarts", filter.restarts, "a count");
-  fields.read("restarts_when_lost", filter.restarts_when_lost, "a count");
-  fields.read("times_lost", filter.times_lost, "a count");
-  fields.read("velocity_doubted", filter.velocity_doubted, "a count");
-  for (RunFields item : fields.list("sensors")) {
-    navigation::SensorSummary sensor;
-    item.read("sensor", sensor.sensor, "a name");
-    item.read("measurements", sensor.measurements, "a count");
-    item.read("refused", sensor.refused, "a count");
-    item.read("chi_square_per_component", sensor.chi_square, "a number");
-    health.sensors.push_back(std::move(sensor));
-  }
-}
-
-}  // namespace
-
 void read_health(RunFields fields, RunHealth& health) {
-  fields.read("frames", health.frames, "a whole number");
-  fields.read("frames_used", health.frames_used, "a whole number");
-  fields.read("depth_images", health.depth_images, "a whole number");
-  fields.read("frames_without_pose", health.frames_without_pose, "a whole number");
-  fields.read("motions_without_scale", health.motions_without_scale, "a whole number");
+  fields.read_all(run_fields, health);
   fields.read("warnings", health.warnings, "a list of sentences");
-  for (RunFields item : fields.list("skipped")) {
-    Skipped skipped;
-    item.read("file", skipped.file, "text");
-    item.read("reason", skipped.reason, "text");
-    health.skipped.push_back(std::move(skipped));
-  }
+  for (RunFields item : fields.list("skipped")) item.read_all(skipped_fields, health.skipped.emplace_back());
   if (!fields.has("navigation")) return;
-  health.navigation.emplace();
-  read_navigation(fields.object("navigation"), *health.navigation);
+  NavigationHealth& navigation = health.navigation.emplace();
+  RunFields read = fields.object("navigation");
+  read.read_all(navigation_fields, navigation);
+  for (RunFields item : read.list("sensors")) item.read_all(sensor_fields, navigation.sensors.emplace_back());
 }
 
 }  // namespace pade::io

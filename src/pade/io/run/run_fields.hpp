@@ -42,6 +42,14 @@ class RunFields {
     }
   }
 
+  /// All fields of an object, by a list as of json_by().
+  template <class List, class Object>
+  void read_all(const List& list, Object& object) {
+    list(object, [this](std::string_view name, auto& value, std::string_view expected) {
+      read(name, value, expected);
+    });
+  }
+
   [[nodiscard]] RunFields object(std::string_view name) {
     static const Json none = Json::object();
     const Json* const found = find(name, "an object");
@@ -109,5 +117,20 @@ class RunFields {
   std::string_view file_;
   std::optional<Error>& error_;
 };
+
+/// An object with the fields that list(object, field) names by calls of field(name, value, expected): the
+/// same list writes and reads.
+template <class List, class Object>
+RunFields::Json json_by(const List& list, const Object& object) {
+  RunFields::Json json = RunFields::Json::object();
+  list(object, [&json](const char* name, const auto& value, std::string_view) {
+    if constexpr (NamedEnum<std::decay_t<decltype(value)>>) {
+      json[name] = to_name(value);
+    } else {
+      json[name] = value;
+    }
+  });
+  return json;
+}
 
 }  // namespace pade::io

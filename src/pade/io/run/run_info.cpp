@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <numeric>
 
@@ -21,39 +22,56 @@ using Fields = RunFields;
 constexpr std::string_view kRunFormat = "pade run 2";
 constexpr double kUnlimitedScale = 500;
 
-Json json_of(const Camera& camera) {
-  return {{"width", camera.width}, {"height", camera.height}, {"fx", camera.fx},
-          {"fy", camera.fy},       {"cx", camera.cx},         {"cy", camera.cy}};
-}
+constexpr auto camera_fields = [](auto& camera, auto&& field) {
+  field("width", camera.width, "pixels");
+  field("height", camera.height, "pixels");
+  field("fx", camera.fx, "pixels");
+  field("fy", camera.fy, "pixels");
+  field("cx", camera.cx, "pixels");
+  field("cy", camera.cy, "pixels");
+};
+constexpr auto map_fields = [](auto& map, auto&& field) {
+  field("voxel_m", map.voxel, "metres");
+  field("occupied_voxels", map.occupied_voxels, "a count");
+  field("free_voxels", map.free_voxels, "a count");
+  field("depths", map.depths, "a count");
+  field("depths_beyond_range", map.depths_beyond, "a count");
+  field("depths_uncertain", map.depths_uncertain, "a count");
+  field("points_outside", map.points_outside, "a count");
+  field("voxel_hits", map.hits, "a count");
+};
+constexpr auto motion_fields = [](auto& motion, auto&& field) {
+  field("pairs", motion.pairs, "a count");
+  field("still_pairs", motion.still_pairs, "a count");
+  field("baseline_m", motion.baseline, "metres");
+  field("rotation_sigma_deg", motion.rotation_sigma, "degrees");
+  field("direction_sigma_deg", motion.direction_sigma, "degrees");
+};
+constexpr auto hint_fields = [](auto& hint, auto&& field) {
+  field("id", hint.id, "a name");
+  field("severity", hint.severity, "warning or error");
+  field("message", hint.message, "text");
+  field("advice", hint.advice, "text");
+};
+constexpr auto origin_fields = [](auto& origin, auto&& field) {
+  field("latitude_deg", origin.latitude_deg, "degrees");
+  field("longitude_deg", origin.longitude_deg, "degrees");
+  field("height_m", origin.height, "metres");
+};
+constexpr auto stage_fields = [](auto& stage, auto&& field) {
+  field("stage", stage.stage, "text");
+  field("frames", stage.count, "a count");
+  field("mean_ms", stage.mean, "milliseconds");
+  field("p50_ms", stage.p50, "milliseconds");
+  field("p99_ms", stage.p99, "milliseconds");
+  field("max_ms", stage.max, "milliseconds");
+};
 
-Json json_of(const MapSummary& map) {
-  return {{"voxel_m", map.voxel},
-          {"occupied_voxels", map.occupied_voxels},
-          {"free_voxels", map.free_voxels},
-          {"depths", map.depths},
-          {"depths_beyond_range", map.depths_beyond},
-          {"depths_uncertain", map.depths_uncertain},
-          {"points_outside", map.points_outside},
-          {"voxel_hits", map.hits}};
-}
-
-Json json_of(const MotionSummary& motion) {
-  return {{"pairs", motion.pairs},
-          {"still_pairs", motion.still_pairs},
-          {"baseline_m", motion.baseline},
-          {"rotation_sigma_deg", motion.rotation_sigma},
-          {"direction_sigma_deg", motion.direction_sigma}};
-}
-
-Json json_of(const std::vector<Hint>& hints) {
-  Json list = Json::array();
-  for (const Hint& hint : hints) {
-    list.push_back({{"id", hint.id},
-                    {"severity", to_name(hint.severity)},
-                    {"message", hint.message},
-                    {"advice", hint.advice}});
-  }
-  return list;
+template <class List, class Items>
+Json list_by(const List& list, const Items& items) {
+  Json json = Json::array();
+  for (const auto& item : items) json.push_back(json_by(list, item));
+  return json;
 }
 
 Json json_of_states(const std::array<std::uint64_t, depth_state_names.size()>& pixels) {
@@ -68,43 +86,9 @@ Json json_of_states(const std::array<std::uint64_t, depth_state_names.size()>& p
   return states;
 }
 
-void read_camera(Fields fields, Camera& camera) {
-  fields.read("width", camera.width, "pixels");
-  fields.read("height", camera.height, "pixels");
-  fields.read("fx", camera.fx, "pixels");
-  fields.read("fy", camera.fy, "pixels");
-  fields.read("cx", camera.cx, "pixels");
-  fields.read("cy", camera.cy, "pixels");
-}
-
-void read_map(Fields fields, MapSummary& map) {
-  fields.read("voxel_m", map.voxel, "metres");
-  fields.read("occupied_voxels", map.occupied_voxels, "a count");
-  fields.read("free_voxels", map.free_voxels, "a count");
-  fields.read("depths", map.depths, "a count");
-  fields.read("depths_beyond_range", map.depths_beyond, "a count");
-  fields.read("depths_uncertain", map.depths_uncertain, "a count");
-  fields.read("points_outside", map.points_outside, "a count");
-  fields.read("voxel_hits", map.hits, "a count");
-}
-
-void read_motion(Fields fields, MotionSummary& motion) {
-  fields.read("pairs", motion.pairs, "a count");
-  fields.read("still_pairs", motion.still_pairs, "a count");
-  fields.read("baseline_m", motion.baseline, "metres");
-  fields.read("rotation_sigma_deg", motion.rotation_sigma, "degrees");
-  fields.read("direction_sigma_deg", motion.direction_sigma, "degrees");
-}
-
-void read_hints(std::vector<Fields> items, std::vector<Hint>& hints) {
-  for (Fields& item : items) {
-    Hint hint;
-    item.read("id", hint.id, "a name");
-    item.read("severity", hint.severity, "warning or error");
-    item.read("message", hint.message, "text");
-    item.read("advice", hint.advice, "text");
-    hints.push_back(std::move(hint));
-  }
+template <class List, class Item>
+void read_list(std::vector<Fields> fields, const List& list, std::vector<Item>& items) {
+  for (Fields& one : fields) one.read_all(list, items.emplace_back());
 }
 
 void read_optional_parts(Fields& fields, RunInfo& info) {
@@ -119,11 +103,7 @@ void read_optional_parts(Fields& fields, RunInfo& info) {
       info.world_up->direction = Eigen::Vector3d(direction[0], direction[1], direction[2]);
   }
   if (fields.has("geographic_origin")) {
-    Fields origin = fields.object("geographic_origin");
-    info.origin.emplace();
-    origin.read("latitude_deg", info.origin->latitude_deg, "degrees");
-    origin.read("longitude_deg", info.origin->longitude_deg, "degrees");
-    origin.read("height_m", info.origin->height, "metres");
+    fields.object("geographic_origin").read_all(origin_fields, info.origin.emplace());
   }
   if (fields.has("local_origin_m")) {  // absent in runs of earlier versions
     std::vector<double> origin;
@@ -131,8 +111,7 @@ void read_optional_parts(Fields& fields, RunInfo& info) {
     if (origin.size() == 3) info.local_origin = Eigen::Vector3d(origin[0], origin[1], origin[2]);
   }
   if (fields.has("map")) {
-    info.map.emplace();
-    read_map(fields.object("map"), *info.map);
+    fields.object("map").read_all(map_fields, info.map.emplace());
   }
 }
 
@@ -143,6 +122,13 @@ Result<Json> parse(std::string_view text, std::string_view file) {
     return Error{fmt::format("{}: byte {}: found no JSON, expected what pade wrote ({})", file, error.byte,
                              error.what())};
   }
+}
+
+double seconds_of(clockid_t clock) {
+  timespec now{};
+  return ::clock_gettime(clock, &now) == 0
+             ? static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec)
+             : 0;
 }
 
 double nearest_rank(const std::vector<double>& sorted, double share) {
@@ -171,6 +157,9 @@ std::uint64_t peak_memory() {
   return ::getrusage(RUSAGE_SELF, &usage) == 0 ? static_cast<std::uint64_t>(usage.ru_maxrss) * 1024 : 0;
 }
 
+double cpu_seconds() { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
+double thread_cpu_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
+
 double scale_for_range(double range) {
   if (!(range > 0) || std::isinf(range)) return kUnlimitedScale;
   return std::max(1.0, std::floor(65534.0 / range));
@@ -182,7 +171,7 @@ std::string to_json(const RunInfo& info) {
                {"sequence", info.sequence.string()},
                {"poses", info.poses},
                {"options", Json::parse(info.options, nullptr, false)},
-               {"camera", json_of(info.camera)},
+               {"camera", json_by(camera_fields, info.camera)},
                {"window", info.window},
                {"range_limit_m", info.range_limit},
                {"health", json_of(info.health)},
@@ -190,9 +179,9 @@ std::string to_json(const RunInfo& info) {
                {"geographic_origin", nullptr},
                {"local_origin_m", {info.local_origin.x(), info.local_origin.y(), info.local_origin.z()}},
                {"map", nullptr},
-               {"motion", json_of(info.motion)},
+               {"motion", json_by(motion_fields, info.motion)},
                {"masked_share", info.masked_share},
-               {"hints", json_of(info.hints)},
+               {"hints", list_by(hint_fields, info.hints)},
                {"stacks", info.stacks},
                {"depth_scale", info.depth_scale},
                {"sigma_scale", info.sigma_scale},
@@ -204,14 +193,8 @@ std::string to_json(const RunInfo& info) {
                         {"stated", info.world_up->stated},
                         {"source", info.world_up->source}};
   }
-  if (info.origin) {
-    json["geographic_origin"] = {{"latitude_deg", info.origin->latitude_deg},
-                                 {"longitude_deg", info.origin->longitude_deg},
-                                 {"height_m", info.origin->height}};
-  }
-  if (info.map) {
-    json["map"] = json_of(*info.map);
-  }
+  if (info.origin) json["geographic_origin"] = json_by(origin_fields, *info.origin);
+  if (info.map) json["map"] = json_by(map_fields, *info.map);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -232,14 +215,14 @@ Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file)
   fields.read("sequence", sequence, "a path");
   fields.read("poses", info.poses, "text");
   fields.read("options", options, "an object");
-  read_camera(fields.object("camera"), info.camera);
+  fields.object("camera").read_all(camera_fields, info.camera);
   fields.read("window", info.window, "a whole number");
   fields.read("range_limit_m", info.range_limit, "metres");
   read_health(fields.object("health"), info.health);
   read_optional_parts(fields, info);
-  read_motion(fields.object("motion"), info.motion);
+  fields.object("motion").read_all(motion_fields, info.motion);
   fields.read("masked_share", info.masked_share, "a share of the image");
-  read_hints(fields.list("hints"), info.hints);
+  read_list(fields.list("hints"), hint_fields, info.hints);
   fields.read("stacks", info.stacks, "a list of names");
   fields.read("depth_scale", info.depth_scale, "counts per metre");
   fields.read("sigma_scale", info.sigma_scale, "counts per metre");
@@ -260,18 +243,11 @@ Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file)
 }
 
 std::string to_json(const RunTiming& timing) {
-  Json stages = Json::array();
-  for (const StageTiming& stage : timing.stages) {
-    stages.push_back({{"stage", stage.stage},
-                      {"frames", stage.count},
-                      {"mean_ms", stage.mean},
-                      {"p50_ms", stage.p50},
-                      {"p99_ms", stage.p99},
-                      {"max_ms", stage.max}});
-  }
-  const Json json = {{"stages", std::move(stages)},
+  const Json json = {{"stages", list_by(stage_fields, timing.stages)},
                      {"frames_per_second", timing.frames_per_second},
-                     {"peak_memory_bytes", timing.peak_memory}};
+                     {"peak_memory_bytes", timing.peak_memory},
+                     {"cpu_seconds", timing.cpu_seconds},
+                     {"stages_cpu_seconds", timing.stages_cpu_seconds}};
   return json.dump(2) + "\n";
 }
 
@@ -281,18 +257,13 @@ Result<RunTiming> run_timing_from_json(std::string_view text, std::string_view f
   std::optional<Error> error;
   Fields fields(*json, "", file, error);
   RunTiming timing;
-  for (Fields item : fields.list("stages")) {
-    StageTiming stage;
-    item.read("stage", stage.stage, "text");
-    item.read("frames", stage.count, "a count");
-    item.read("mean_ms", stage.mean, "milliseconds");
-    item.read("p50_ms", stage.p50, "milliseconds");
-    item.read("p99_ms", stage.p99, "milliseconds");
-    item.read("max_ms", stage.max, "milliseconds");
-    timing.stages.push_back(std::move(stage));
-  }
+  read_list(fields.list("stages"), stage_fields, timing.stages);
   fields.read("frames_per_second", timing.frames_per_second, "a number");
   fields.read("peak_memory_bytes", timing.peak_memory, "bytes");
+  if (fields.has("cpu_seconds")) {  // absent in runs of earlier versions
+    fields.read("cpu_seconds", timing.cpu_seconds, "seconds");
+    fields.read("stages_cpu_seconds", timing.stages_cpu_seconds, "seconds");
+  }
   if (error) return *error;
   return timing;
 }

@@ -82,12 +82,18 @@ struct RunTiming {
   std::vector<StageTiming> stages;  ///< in the order of the pipeline; "total" is a frame's latency
   double frames_per_second = 0;     ///< frames over wall time of the whole run, reading and writing included
   std::uint64_t peak_memory = 0;    ///< bytes of resident memory
+  double cpu_seconds = 0;           ///< of the process, all threads; 0 in runs of earlier versions
+  double stages_cpu_seconds = 0;    ///< of the stages alone
 };
 
 /// Percentiles by nearest rank. Empty input gives count 0.
 StageTiming summarise(std::string_view stage, std::vector<double> milliseconds);
 /// Largest resident memory of this process so far, bytes.
 std::uint64_t peak_memory();
+/// Processor time of this process so far, all threads, s.
+double cpu_seconds();
+/// Processor time of the calling thread so far, s.
+double thread_cpu_seconds();
 
 /// The counts per metre of a 16-bit image that must hold `range` metres: the largest whole number that fits,
 /// with one count to spare, so that what lies beyond (and saturates) still reads as beyond. Without a limit

@@ -103,10 +103,10 @@ RunInfo RunWriter::completed(RunInfo info) const {
   return info;
 }
 
-Status RunWriter::finish(const RunInfo& info, const RunTiming& timing) {
+Status RunWriter::finish(const RunInfo& info, const std::function<RunTiming()>& timing) {
   if (Status status = output_.write("trajectory.txt", trajectory_); !status) return status;
-  if (Status status = output_.write("timing.json", to_json(timing)); !status) return status;
   if (Status status = output_.write(run_file, to_json(completed(info))); !status) return status;
+  if (Status status = output_.write("timing.json", to_json(timing())); !status) return status;
   return output_.commit();
 }
 

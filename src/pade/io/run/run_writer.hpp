@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -47,8 +48,9 @@ class RunWriter {
   /// One row of trajectory.txt (TUM: t x y z qx qy qz qw, camera to world).
   void add_pose(Time time, const Pose& T_world_camera);
 
-  /// A file of the run with this content: evaluation.json, report.html ...
-  Status write(const std::filesystem::path& name, std::string_view content) {
+  /// A file of the run with this content, a text or a ByteSource: evaluation.json, cloud.ply ...
+  template <class Content>
+  Status write(const std::filesystem::path& name, const Content& content) {
     return output_.write(name, content);
   }
   /// Where a writer that takes a path puts a file of the run now: cloud.ply, map.bt, map.ot ...
@@ -59,8 +61,9 @@ class RunWriter {
   /// `info` with the fields that the writer knows: scales, stacks, counts of states.
   [[nodiscard]] RunInfo completed(RunInfo info) const;
 
-  /// Writes run.json, trajectory.txt and timing.json and moves the folder to its place.
-  Status finish(const RunInfo& info, const RunTiming& timing);
+  /// Writes trajectory.txt, run.json and, as the last of all, timing.json with what `timing` says then; moves
+  /// the folder to its place.
+  Status finish(const RunInfo& info, const std::function<RunTiming()>& timing);
 
  private:
   RunWriter(OutputFolder output, const RunWriterOptions& options);

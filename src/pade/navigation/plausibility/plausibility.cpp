@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/navigation/plausibility/force_match.hpp"
 #include "pade/navigation/plausibility/position_lag.hpp"
 
@@ -15,13 +16,6 @@ namespace pade::navigation {
 namespace {
 
 using Eigen::Matrix3d;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 void add(std::vector<Hint>& hints, std::string id, HintSeverity severity, std::string message,
          std::string advice) {

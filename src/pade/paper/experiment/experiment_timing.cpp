@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/depth/derotation.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/mapping/occupancy_map.hpp"
@@ -35,13 +36,6 @@ double time_of(const Work& work) {
   const double start = thread_milliseconds();
   work();
   return thread_milliseconds() - start;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// The steps of one job on its pairs, each with its times.
@@ -85,10 +79,11 @@ class Clock {
 
   [[nodiscard]] JobTimes times() const {
     JobTimes times;
-    if (!derotate_.empty()) times.derotate = median(derotate_);
-    times.flow = median(flow_times_);
-    for (std::size_t c = 0; c < depth_.size(); ++c) times.depth[job_.cells[c].name] = median(depth_[c]);
-    if (maps()) times.map = median(map_times_);
+    if (!derotate_.empty()) times.derotate = median(std::vector<double>(derotate_));
+    times.flow = median(std::vector<double>(flow_times_));
+    for (std::size_t c = 0; c < depth_.size(); ++c)
+      times.depth[job_.cells[c].name] = median(std::vector<double>(depth_[c]));
+    if (maps()) times.map = median(std::vector<double>(map_times_));
     return times;
   }
 

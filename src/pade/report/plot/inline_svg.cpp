@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cstdint>
 
 #include <fmt/format.h>
 
+#include "pade/core/fingerprint.hpp"
 #include "pade/report/report_text.hpp"
 
 namespace pade::evaluation {
@@ -63,9 +63,9 @@ std::string inline_svg(std::string_view gnuplot_svg, std::string_view id, std::s
 
 std::string id_of(std::string_view wanted, std::string_view content) {
   if (wanted.empty()) {
-    std::uint64_t digest = 0xcbf29ce484222325;  // FNV-1a
-    for (const char c : content) digest = (digest ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-    return fmt::format("plot-{:016x}", digest);
+    Fingerprint digest;
+    digest.bytes(content.data(), content.size());
+    return "plot-" + digest.hex();
   }
   std::string id(wanted);
   for (char& c : id) {

@@ -20,13 +20,13 @@ Pose level_camera(const Vector3d& position, double yaw = 0, double pitch = 0, do
 }
 
 /// An upright box from its lower corner to its upper corner, turned about its vertical axis.
-Box upright_box(const Vector3d& low, const Vector3d& high, double yaw = 0) {
+AnalyticBox upright_box(const Vector3d& low, const Vector3d& high, double yaw = 0) {
   return {{Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Vector3d::UnitZ())), 0.5 * (low + high)},
           0.5 * (high - low)};
 }
 
-Material plain(double albedo, std::uint32_t seed, double contrast = 0.3, double coarsest = 1.2) {
-  Material material;
+AnalyticMaterial plain(double albedo, std::uint32_t seed, double contrast = 0.3, double coarsest = 1.2) {
+  AnalyticMaterial material;
   material.albedo = albedo;
   material.seed = seed;
   material.contrast = contrast;
@@ -42,17 +42,18 @@ AnalyticScene street() {
   scene.add("blank wall", upright_box({6, -5.5, -0.5}, {13, -5, 3.2}), plain(0.65, 13, 0));
   scene.add("crate", upright_box({7, 1.2, 0}, {8.2, 2.4, 1.2}, 0.4), plain(0.5, 14, 0.35, 0.6));
   scene.add("tower", upright_box({10.5, -2.2, 0}, {11.7, -1.2, 3.0}, -0.3), plain(0.55, 15, 0.35, 0.6));
-  scene.add("tilted slab",
-            Box{{Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Vector3d(1, 2, 3).normalized())), {9, 4, 1.5}},
-                {0.8, 0.5, 0.3}},
-            plain(0.6, 16, 0.35, 0.6));
+  scene.add(
+      "tilted slab",
+      AnalyticBox{{Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Vector3d(1, 2, 3).normalized())), {9, 4, 1.5}},
+                  {0.8, 0.5, 0.3}},
+      plain(0.6, 16, 0.35, 0.6));
   scene.add("near ball", Sphere{{5.5, -0.9, 0.8}, 0.45}, plain(0.55, 17, 0.35, 0.4));
   scene.add("far ball", Sphere{{12, 1.5, 2.3}, 0.9}, plain(0.5, 18, 0.35, 0.6));
   return scene;
 }
 
 void add_building(AnalyticScene& scene) {
-  Material wall = plain(0.62, 21, 0.24, 1.6);
+  AnalyticMaterial wall = plain(0.62, 21, 0.24, 1.6);
   wall.pane_period_u = 3.0;
   wall.pane_period_v = 2.9;
   wall.pane_width = 1.3;
@@ -87,8 +88,8 @@ AnalyticScene courtyard() {
   scene.add("lantern post", upright_box({10.2, 0.62, 0}, {10.42, 0.84, 2.6}), plain(0.4, 49, 0.4, 0.25));
   scene.add("lantern", Sphere{{10.31, 0.73, 2.85}, 0.3}, plain(0.75, 50, 0.25, 0.25));
   scene.add("obelisk",
-            Box{{Eigen::Quaterniond(Eigen::AngleAxisd(0.6, Vector3d::UnitZ())), {14.5, -0.9, 1.4}},
-                {0.35, 0.35, 1.4}},
+            AnalyticBox{{Eigen::Quaterniond(Eigen::AngleAxisd(0.6, Vector3d::UnitZ())), {14.5, -0.9, 1.4}},
+                        {0.35, 0.35, 1.4}},
             plain(0.58, 51, 0.3, 0.4));
   return scene;
 }

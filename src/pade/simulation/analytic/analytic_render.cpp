@@ -2,26 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
-#include <thread>
 #include <vector>
+
+#include "pade/core/compute/parallel.hpp"
 
 namespace pade::simulation {
 namespace {
-
-/// Calls row(v) for every v in [0, rows). Rows write only to themselves, so any split gives the same result.
-void for_each_row(int rows, int threads, const std::function<void(int)>& row) {
-  const int workers = std::clamp(threads, 1, std::max(rows, 1));
-  const auto work = [&](int first) {
-    for (int v = first; v < rows; v += workers) row(v);
-  };
-  std::vector<std::thread> others;
-  for (int i = 1; i < workers; ++i) others.emplace_back(work, i);
-  work(0);
-  for (std::thread& thread : others) thread.join();
-}
 
 /// A camera at a pose: viewing rays in the world, of unit Z in the camera.
 class Eye {
@@ -112,7 +100,7 @@ std::vector<std::vector<Sight>> look_at_all(const AnalyticScene& scene, const Ca
                                             int threads) {
   std::vector<std::vector<Sight>> sights(static_cast<std::size_t>(camera.height),
                                          std::vector<Sight>(static_cast<std::size_t>(camera.width)));
-  for_each_row(camera.height, threads, [&](int v) {
+  parallel_rows(camera.height, threads, [&](int v) {
     for (int u = 0; u < camera.width; ++u) {
       sights[static_cast<std::size_t>(v)][static_cast<std::size_t>(u)] = look(scene, eye, u, v);
     }
@@ -123,11 +111,11 @@ std::vector<std::vector<Sight>> look_at_all(const AnalyticScene& scene, const Ca
 }  // namespace
 
 cv::Mat render_image(const AnalyticScene& scene, const Camera& camera, const Pose& T_world_camera,
-                     const RenderOptions& options) {
+                     const AnalyticRenderOptions& options) {
   const Eye eye(camera, T_world_camera);
   const auto sights = look_at_all(scene, camera, eye, options.threads);
   cv::Mat image(camera.size(), CV_8UC1);
-  for_each_row(camera.height, options.threads, [&](int v) {
+  parallel_rows(camera.height, options.threads, [&](int v) {
     auto* row = image.ptr<std::uint8_t>(v);
     for (int u = 0; u < camera.width; ++u) {
       const Sight& centre = sights[static_cast<std::size_t>(v)][static_cast<std::size_t>(u)];
@@ -159,7 +147,7 @@ cv::Mat exact_depth(const AnalyticScene& scene, const Camera& camera, const Pose
                     int threads) {
   const Eye eye(camera, T_world_camera);
   cv::Mat depth(camera.size(), CV_32FC1);
-  for_each_row(camera.height, threads, [&](int v) {
+  parallel_rows(camera.height, threads, [&](int v) {
     auto* row = depth.ptr<float>(v);
     for (int u = 0; u < camera.width; ++u) {
       const Sight sight = look(scene, eye, u, v);
@@ -173,7 +161,7 @@ cv::Mat exact_labels(const AnalyticScene& scene, const Camera& camera, const Pos
                      int threads) {
   const Eye eye(camera, T_world_camera);
   cv::Mat labels(camera.size(), CV_8UC1);
-  for_each_row(camera.height, threads, [&](int v) {
+  parallel_rows(camera.height, threads, [&](int v) {
     auto* row = labels.ptr<std::uint8_t>(v);
     for (int u = 0; u < camera.width; ++u) {
       const Sight sight = look(scene, eye, u, v);
@@ -217,7 +205,7 @@ std::optional<ExactFlow> exact_flow_at(const AnalyticScene& scene, const Camera&
 ExactFlowField exact_flow(const AnalyticScene& scene, const Camera& camera, const Pose& T_world_from,
                           const Pose& T_world_to, int threads) {
   ExactFlowField field{{cv::Mat(camera.size(), CV_32FC2), {}}, cv::Mat(camera.size(), CV_8UC1)};
-  for_each_row(camera.height, threads, [&](int v) {
+  parallel_rows(camera.height, threads, [&](int v) {
     auto* vectors = field.flow.vectors.ptr<cv::Vec2f>(v);
     auto* visible = field.visible.ptr<std::uint8_t>(v);
     for (int u = 0; u < camera.width; ++u) {

@@ -15,7 +15,7 @@
 namespace pade::simulation {
 
 /// How an image is taken. The options of the sensor only; depth and flow are exact.
-struct RenderOptions {
+struct AnalyticRenderOptions {
   int samples = 2;               ///< at edges of surfaces a pixel is the mean of samples x samples rays
   double noise_sigma = 0;        ///< standard deviation of the sensor noise, grey levels
   std::uint64_t noise_seed = 0;  ///< give each frame its own; same seed, same noise
@@ -30,7 +30,7 @@ struct RenderOptions {
 
 /// Grey image of an undistorted or distorted camera. CV_8UC1; pixels outside the lens are 0.
 cv::Mat render_image(const AnalyticScene& scene, const Camera& camera, const Pose& T_world_camera,
-                     const RenderOptions& options = {});
+                     const AnalyticRenderOptions& options = {});
 
 /// Exact Z-depth at each pixel centre. CV_32FC1, metres; NaN = sky or outside the lens.
 cv::Mat exact_depth(const AnalyticScene& scene, const Camera& camera, const Pose& T_world_camera,

@@ -26,7 +26,7 @@ Entry enter(const HalfSpace& solid, const Surface& /*surface*/, const Eigen::Vec
 }
 
 /// Slab method (Kay and Kajiya 1986), in the frame of the box.
-Entry enter(const Box& box, const Surface& surface, const Eigen::Vector3d& origin,
+Entry enter(const AnalyticBox& box, const Surface& surface, const Eigen::Vector3d& origin,
             const Eigen::Vector3d& direction) {
   const Eigen::Vector3d o = surface.R_shape_world * (origin - surface.centre);
   const Eigen::Vector3d d = surface.R_shape_world * direction;
@@ -74,7 +74,7 @@ double signed_distance_to(const HalfSpace& solid, const Surface& /*surface*/, co
   return solid.normal.dot(point - solid.point);
 }
 
-double signed_distance_to(const Box& box, const Surface& surface, const Eigen::Vector3d& point) {
+double signed_distance_to(const AnalyticBox& box, const Surface& surface, const Eigen::Vector3d& point) {
   const Eigen::Vector3d q = (surface.R_shape_world * (point - surface.centre)).cwiseAbs() - box.half_size;
   return q.cwiseMax(0).norm() + std::min(q.maxCoeff(), 0.0);
 }
@@ -105,8 +105,9 @@ Footprint principal_axes(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
 /// How much of the footprint is covered by panes, 0 to 1.
 double pane_coverage(const Surface& surface, int face, const Eigen::Vector3d& point, const Eigen::Vector3d& u,
                      const Eigen::Vector3d& v) {
-  const Material& m = surface.material;
-  if (!(m.pane_period_u > 0) || !std::holds_alternative<Box>(surface.shape) || face / 2 == 2) return 0;
+  const AnalyticMaterial& m = surface.material;
+  if (!(m.pane_period_u > 0) || !std::holds_alternative<AnalyticBox>(surface.shape) || face / 2 == 2)
+    return 0;
   const int across = face / 2 == 0 ? 1 : 0;  // upright faces: the horizontal axis in the face
   const Eigen::Vector3d q = surface.R_shape_world * (point - surface.centre);
   const Eigen::Vector3d width =
@@ -117,7 +118,7 @@ double pane_coverage(const Surface& surface, int face, const Eigen::Vector3d& po
 
 /// Texture averaged over the footprint: a few probes along its longer axis, each as wide as the shorter one,
 /// so that ground seen at a grazing angle keeps the texture that a camera would see across the line of sight.
-double texture(const Material& material, const Eigen::Vector3d& point, const Footprint& footprint) {
+double texture(const AnalyticMaterial& material, const Eigen::Vector3d& point, const Footprint& footprint) {
   constexpr double kMostProbes = 4;
   const double ratio = footprint.major_length / std::max(footprint.minor_length, 1e-12);
   const double probes = std::clamp(std::ceil(ratio - 0.5), 1.0, kMostProbes);
@@ -132,9 +133,9 @@ double texture(const Material& material, const Eigen::Vector3d& point, const Foo
 
 }  // namespace
 
-int AnalyticScene::add(std::string name, const Shape& shape, const Material& material) {
+int AnalyticScene::add(std::string name, const AnalyticShape& shape, const AnalyticMaterial& material) {
   Surface surface{std::move(name), shape, material};
-  if (const auto* box = std::get_if<Box>(&shape)) {
+  if (const auto* box = std::get_if<AnalyticBox>(&shape)) {
     surface.R_shape_world = box->T_world_box.matrix3().transpose();
     surface.centre = box->T_world_box.translation;
   } else if (const auto* ball = std::get_if<Sphere>(&shape)) {
@@ -180,7 +181,7 @@ double AnalyticScene::brightness(const RayHit& hit, const Eigen::Vector3d& point
                                  const Eigen::Vector3d& footprint_u,
                                  const Eigen::Vector3d& footprint_v) const {
   const Surface& surface = surfaces_[static_cast<std::size_t>(hit.surface)];
-  const Material& m = surface.material;
+  const AnalyticMaterial& m = surface.material;
   const double panes = pane_coverage(surface, hit.face, point, footprint_u, footprint_v);
   double albedo = m.albedo + panes * (m.pane_albedo - m.albedo);
   if (m.contrast > 0) albedo *= 1 + m.contrast * texture(m, point, principal_axes(footprint_u, footprint_v));

@@ -17,7 +17,7 @@ namespace pade::simulation {
 
 /// How a surface reflects light. Everything is fixed to the surface: brightness does not depend on where the
 /// camera is (Lambert's law under one distant sun), so that brightness constancy holds exactly.
-struct Material {
+struct AnalyticMaterial {
   double albedo = 0.55;    ///< mean reflectance, 0 to 1
   double contrast = 0.30;  ///< amplitude of the texture relative to the albedo; 0 = blank
   double coarsest = 1.2;   ///< lattice spacing of the coarsest octave of the texture, m
@@ -40,7 +40,7 @@ struct HalfSpace {
 };
 
 /// A solid box of any orientation.
-struct Box {
+struct AnalyticBox {
   Pose T_world_box;                                           ///< origin at the centre
   Eigen::Vector3d half_size = Eigen::Vector3d::Constant(.5);  ///< m, each > 0
 };
@@ -51,7 +51,7 @@ struct Sphere {
   double radius = 1;  ///< m, > 0
 };
 
-using Shape = std::variant<HalfSpace, Box, Sphere>;
+using AnalyticShape = std::variant<HalfSpace, AnalyticBox, Sphere>;
 
 /// Where a ray first enters a solid.
 struct RayHit {
@@ -66,15 +66,15 @@ class AnalyticScene {
  public:
   struct Surface {
     std::string name;
-    Shape shape;
-    Material material;
+    AnalyticShape shape;
+    AnalyticMaterial material;
     // Derived once, for speed.
     Eigen::Matrix3d R_shape_world = Eigen::Matrix3d::Identity();
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   };
 
   /// Adds a solid; returns its index.
-  int add(std::string name, const Shape& shape, const Material& material = {});
+  int add(std::string name, const AnalyticShape& shape, const AnalyticMaterial& material = {});
 
   [[nodiscard]] const std::vector<Surface>& surfaces() const { return surfaces_; }
 

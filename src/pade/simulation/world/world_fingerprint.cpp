@@ -1,19 +1,14 @@
 #include "pade/simulation/world/world_fingerprint.hpp"
 
-#include <cstring>
 #include <set>
 
-#include <fmt/format.h>
+#include "pade/core/fingerprint.hpp"
 
 namespace pade::simulation {
 namespace {
 
-class Hash {
+class Hash : public Fingerprint {
  public:
-  void bytes(const void* data, std::size_t size) {
-    const auto* p = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ p[i]) * 0x100000001b3ULL;
-  }
   void number(double x) { bytes(&x, sizeof x); }
   template <class Derived>
   void vector(const Eigen::MatrixBase<Derived>& v) {
@@ -48,10 +43,8 @@ class Hash {
     if (m.image && images_.insert(m.image.get()).second)
       bytes(m.image->data, m.image->total() * m.image->elemSize());
   }
-  [[nodiscard]] std::uint64_t value() const { return value_; }
 
  private:
-  std::uint64_t value_ = 0xcbf29ce484222325ULL;
   std::set<const TriangleMesh*> meshes_;
   std::set<const cv::Mat*> images_;
 };
@@ -75,7 +68,7 @@ std::string world_fingerprint(const World& world) {
   hash.vector(world.ambient);
   hash.vector(world.background);
   hash.number(world.sky ? 1 : 0);
-  return fmt::format("{:016x}", hash.value());
+  return hash.hex();
 }
 
 }  // namespace pade::simulation
