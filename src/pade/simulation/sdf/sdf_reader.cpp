@@ -38,7 +38,9 @@ Eigen::Vector3d linear_colour(const ignition::math::Color& c) {
 }
 
 Error error_of(const sdf::Error& error, const fs::path& file) {
-  const std::string where = error.FilePath() ? *error.FilePath() : file.string();
+  // What was mended is read from memory, which libsdformat calls "<data-string>".
+  const bool named = error.FilePath() && !error.FilePath()->starts_with('<');
+  const std::string where = named ? *error.FilePath() : file.string();
   const std::string line = error.LineNumber() ? fmt::format(":{}", *error.LineNumber()) : "";
   // libsdformat says of a colour no more than that it is invalid.
   static const std::set<std::string> kColours = {"<diffuse>", "<ambient>", "<emissive>", "<specular>",
