@@ -35,6 +35,7 @@ set(pade_public_headers
   depth/multi_view/common_error.hpp
   depth/multi_view/views_depth.hpp
   mapping/occupancy_map.hpp
+  mapping/query/map_view.hpp
   io/atomic_output.hpp
   io/formats/map_files.hpp
   io/world.hpp

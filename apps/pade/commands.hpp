@@ -18,7 +18,9 @@ void add_info(CLI::App& app, Context& context);
 void add_sample(CLI::App& app, Context& context);
 void add_flow(CLI::App& app, Context& context);
 void add_simulate(CLI::App& app, Context& context);
+void add_fly(CLI::App& app, Context& context);
 void add_navigate(CLI::App& app, Context& context);
+void add_plan(CLI::App& app, Context& context);
 void add_flow_evaluate(CLI::App& flow, Context& context);  // of `pade flow`
 void add_experiment(CLI::App& app, Context& context);
 void add_completion(CLI::App& app, Context& context);  // last: it describes all the others

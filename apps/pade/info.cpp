@@ -24,6 +24,7 @@
 #include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
+#include "plan/place_info.hpp"
 
 namespace pade::cli {
 namespace {
@@ -42,6 +43,7 @@ struct InfoArguments {
   std::string poses = "groundtruth";
   std::string world_up;
   std::string calibration;
+  std::vector<double> at;
   int camera = 0;
   int step = 1;
   bool json = false;
@@ -290,12 +292,11 @@ Status inform_of_map(const InfoArguments& arguments) {
   const Result<mapping::OccupancyMap> map = io::read_map(arguments.path);
   if (!map) return map.error();
   const double voxel = map->options().voxel;
-  const double cube = voxel * voxel * voxel;
   const mapping::OccupancyMap::Counts counts = map->counts();
-  const double occupied = static_cast<double>(counts.occupied) * cube;
-  const double free = static_cast<double>(counts.free) * cube;
+  const auto volume = [&](std::size_t voxels) { return static_cast<double>(voxels) * voxel * voxel * voxel; };
   const Eigen::AlignedBox3d bounds = map->bounds();
   const Eigen::Vector3d origin = io::local_origin_of(arguments.path);
+  const double* asked = arguments.at.empty() ? nullptr : arguments.at.data();
   if (arguments.json) {
     Json json = {{"kind", "map"},
                  {"file", arguments.path},
@@ -303,23 +304,25 @@ Status inform_of_map(const InfoArguments& arguments) {
                  {"nodes", map->tree().size()},
                  {"occupied_voxels", counts.occupied},
                  {"free_voxels", counts.free},
-                 {"occupied_m3", occupied},
-                 {"free_m3", free},
+                 {"occupied_m3", volume(counts.occupied)},
+                 {"free_m3", volume(counts.free)},
                  {"local_origin_m", json_of(origin)},
                  {"bounds_m", nullptr}};
     if (!bounds.isEmpty())
       json["bounds_m"] = {{"from", json_of(bounds.min())}, {"to", json_of(bounds.max())}};
+    if (asked != nullptr) json["place"] = place_json(*map, Eigen::Vector3d(asked));
     fmt::print("{}\n", json.dump(2));
     return {};
   }
   fmt::print("{}: occupancy map with voxels of {:g} m\n", arguments.path, voxel);
   line("nodes", "{}", map->tree().size());
-  line("occupied", "{} voxels, {:.3f} m3", counts.occupied, occupied);
-  line("free", "{} voxels, {:.3f} m3", counts.free, free);
+  line("occupied", "{} voxels, {:.3f} m3", counts.occupied, volume(counts.occupied));
+  line("free", "{} voxels, {:.3f} m3", counts.free, volume(counts.free));
   if (!bounds.isEmpty()) line("bounds", "{} to {} m", vector_text(bounds.min()), vector_text(bounds.max()));
   if (!origin.isZero(0))
     line("local origin", "{} {} {}: add it to get back to the coordinates of the poses", origin.x(),
          origin.y(), origin.z());
+  if (asked != nullptr) fmt::print("{}", place_text(*map, Eigen::Vector3d(asked)));
   return {};
 }
 
@@ -484,6 +487,7 @@ void add_info(CLI::App& app, Context& context) {
       ->check(CLI::Range(0, 99));
   command->add_option("--step", arguments->step, "Look at each frame and the k-th before it")
       ->capture_default_str();
+  command->add_option("--at", arguments->at, "x y z: what a map says of a place, m")->expected(3);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments, &context] {
     const Status status = inform(*arguments);

@@ -16,6 +16,7 @@
 #ifdef PADE_HAS_SIMULATION
 #include "pade/io/atomic_output.hpp"
 #include "pade/simulation/flight/simulated_sequence.hpp"
+#include "pade/simulation/generator/open_world_scene.hpp"
 #include "pade/simulation/generator/paper_set.hpp"
 #include "pade/simulation/generator/paper_set_files.hpp"
 #include "pade/simulation/generator/world_generator.hpp"
@@ -37,6 +38,7 @@ struct SimulateArguments {
   std::vector<std::string> resources;
   std::vector<std::string> save;
   std::uint64_t seed = 1;
+  double density = 0;  // per hectare; 0 = a world with a lane
   int threads = 1;
   int samples = 4;
   int every = 1;
@@ -117,7 +119,38 @@ Status simulate_set(const SimulateArguments& arguments) {
   return {};
 }
 
+/// A world without a lane: written and checked, then flown through if there is a flight.
+Status simulate_open_world(const SimulateArguments& arguments) {
+  const auto kind = from_name<OpenWorldKind>(arguments.random);
+  if (!kind)
+    return Error{
+        fmt::format("--random: found '{}', with --density expected forest, rubble, building-site or street",
+                    arguments.random)};
+  if (arguments.write_world.empty() && (arguments.out.empty() || arguments.flight.empty()))
+    return Error{"--density: found neither --write-world nor --flight with --out, expected one of them"};
+  const fs::path file = arguments.write_world.empty() ? default_cache() / "worlds" /
+                                                            fmt::format("{}-{}-{}", arguments.random,
+                                                                        arguments.seed, arguments.density) /
+                                                            (arguments.random + ".sdf")
+                                                      : fs::path(arguments.write_world);
+  const auto made = make_open_world(*kind, arguments.seed, arguments.density, file);
+  if (!made) return made.error();
+  fmt::print("{}: world {} of seed {}, from ({}, {}, {}) to ({}, {}, {}) m\n", file.string(),
+             made->attempt + 1, arguments.seed, made->start.x(), made->start.y(), made->start.z(),
+             made->goal.x(), made->goal.y(), made->goal.z());
+  if (arguments.out.empty()) return {};
+  const auto flight = read_flight(arguments.flight);
+  if (!flight) return flight.error();
+  if (const Status s =
+          render(made->scene, *flight, arguments.out, arguments, sequence_options(arguments), flight->name);
+      !s)
+    return s;
+  fmt::print("{}\n", arguments.out);
+  return {};
+}
+
 Status simulate(const SimulateArguments& arguments) {
+  if (arguments.density > 0) return simulate_open_world(arguments);
   if (!arguments.set.empty()) return simulate_set(arguments);
   std::optional<WorldKind> kind;
   fs::path file = arguments.world;
@@ -189,6 +222,12 @@ void add_simulate(CLI::App& app, Context& context) {
                       "make the world: building, street, forest, rubble or corridor");
   command->add_option("--seed", arguments->seed,
                       "changes the random world, the image noise and the sensors' errors");
+  command
+      ->add_option(
+          "--density", arguments->density,
+          "with --random forest, rubble, building-site or street: this many obstacles per hectare and no "
+          "lane between start and goal, 60 m apart")
+      ->check(CLI::Range(10.0, 2000.0));
   command->add_option("--write-world", arguments->write_world,
                       "write the random world to this SDF file (alone: without a flight)");
   command->add_option("--set", arguments->set, "paper: the ten sequences, 1038 frames, of the experiments");

@@ -157,6 +157,25 @@ const Wrong kCalibrations[] = {
      kMapWith,
      1,
      {"line 2", "<calibration>", "<opencv_storage>"}},
+    {"LensInAnotherFile",
+     [](const fs::path& f) {
+       calibration(f, "%YAML:1.0\nimu: 1\ncam0_calib: \"cam0_pinhole.yaml\"\nestimate_extrinsic: 0\n");
+     },
+     kMapWith,
+     1,
+     {"c.yaml: line 3: field cam0_calib", "cam0_pinhole.yaml", "give that one"}},
+    {"ReportOfKalibr",
+     [](const fs::path& f) {
+       calibration(f, "Calibration results\n====\nCamera-system parameters:\ncam0 (/cam):\n");
+     },
+     kMapWith,
+     1,
+     {"Kalibr's report", "camchain.yaml"}},
+    {"BinaryOfColmap",
+     [](const fs::path& f) { calibration(f, std::string("\1\0\0\0\0\0\0\0", 8)); },
+     kMapWith,
+     1,
+     {"binary", "model_converter"}},
     {"NoCameraInIt",
      [](const fs::path& f) { calibration(f, "rate_hz: 20\nauthor: me\n"); },
      kMapWith,
@@ -199,6 +218,48 @@ const Wrong kFolders[] = {
      kMap,
      1,
      {"groundtruth.txt", "quaternion"}},
+    {"AnglesUnderAHeading",
+     [](const fs::path& f) {
+       flight(f);
+       write_file(f / "flight" / "groundtruth.txt",
+                  "time,x,y,z,roll,pitch,yaw\n0,1,2,3,0.1,0.2,0.3\n0.1,1,2,3,0.1,0.2,0.3\n");
+     },
+     kMap,
+     1,
+     {"groundtruth.txt: line 1: found columns time, x, y, z, roll", "quaternions"}},
+    {"LatitudeAndLongitudeAsPoses",
+     [](const fs::path& f) {
+       flight(f);
+       write_file(f / "flight" / "groundtruth.txt",
+                  "time lat lon alt qx qy qz qw\n0 47 8 400 0 0 0 1\n0.1 47 8 400 0 0 0 1\n");
+     },
+     kMap,
+     1,
+     {"line 1: found columns time, lat", "gnss.csv"}},
+    {"PosesOfColmap",
+     [](const fs::path& f) {
+       flight(f);
+       write_file(f / "flight" / "groundtruth.txt",
+                  "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n1 1 0 0 0 0 0 0 1 "
+                  "0.000000.png\n1 2 -1\n");
+     },
+     kMap,
+     1,
+     {"COLMAP's images.txt", "inverse"}},
+    {"PosesInMilliseconds",
+     [](const fs::path& f) {
+       flight_with_rows(f, [](const auto& v) {
+         return fmt::format("{:.0f} {}", 1000 * std::stod(v[0]), fmt::join(v.begin() + 1, v.end(), " "));
+       });
+     },
+     kMap,
+     1,
+     {"gap of 100.000 s", "milliseconds?"}},
+    {"AFilm",
+     [](const fs::path& f) { write_file(f / "flight.mp4", "film"); },
+     "map flight.mp4 --no-report -o OUT",
+     1,
+     {"is a file", "film", "rgb/"}},
     {"PositionsOnly",
      [](const fs::path& f) {
        flight_with_rows(f, [](const auto& v) { return v[0] + " " + v[1] + " " + v[2] + " " + v[3]; });

@@ -66,6 +66,60 @@ const Wrong kLogs[] = {
      kNavigate,
      0,
      {"no columns of velocity", "--heading"}},
+    {"UnitOfTheHeadingThatNobodyKnows",
+     [](const fs::path& f) {
+       Recording r(1, 5);
+       r.gnss_head =
+           "# frame=ENU\nt_s,px,py,pz,vx "
+           "[knot/s],vy,vz,sigma_px,sigma_py,sigma_pz,sigma_vx,sigma_vy,sigma_vz\n";
+       r.write(f / "log");
+     },
+     kNavigate,
+     1,
+     {"found unit 'knot/s' of vx", "km/h"}},
+    {"LatitudesInMinutes",
+     [](const fs::path& f) {
+       Recording r(1, 5);
+       r.write(f / "log");
+       write_file(f / "log" / "gnss.csv", "t_s,lat,lon,alt\n0,4722.61,832.5,408\n0.2,4722.61,832.5,408\n");
+     },
+     kNavigate,
+     1,
+     {"gnss.csv: line 2: found latitude 4722.61", "ddmm.mmmm"}},
+    {"TimesOfTheDay",
+     [](const fs::path& f) {
+       Recording r(1, 5);
+       r.write(f / "log");
+       write_file(f / "log" / "gnss.csv", "time,lat,lon,alt\n2020-09-13T12:26:00.0Z,47.3,8.5,408\n");
+     },
+     kNavigate,
+     1,
+     {"line 2: found time \"2020-09-13T12:26:00.0Z\"", "seconds"}},
+    {"TablesOfAnAutopilotUnderTheirOwnNames",
+     [](const fs::path& f) {
+       write_file(f / "log" / "log_sensor_combined_0.csv", "timestamp\n");
+       write_file(f / "log" / "log_vehicle_gps_position_0.csv", "timestamp\n");
+     },
+     kNavigate,
+     1,
+     {"expected imu.csv", "found log_sensor_combined_0.csv"}},
+    {"ALogThatIsNoFolder",
+     [](const fs::path& f) {
+       write_file(f / "log", "ULog");
+       fs::rename(f / "log", f / "log.ulg");
+     },
+     "navigate log.ulg -o OUT",
+     1,
+     {"is a file", "ulog2csv"}},
+    {"NoHeading",
+     [](const fs::path& f) {
+       Recording r(1, 5);
+       r.imu_head = "";
+       r.write(f / "log");
+     },
+     kNavigate,
+     1,
+     {"imu.csv:1", "expected a heading", "t_s,gx,gy,gz"}},
     {"NoGnss",
      [](const fs::path& f) {
        Recording(1, 5).write(f / "log");
@@ -133,6 +187,27 @@ const Wrong kImplausible[] = {
      kNavigate,
      0,
      {"frame=FRD"}},
+    {"AxesThatChangedPlaces",
+     [](const fs::path& f) {
+       Recording r(2);
+       r.each_imu([](ImuSample& s) {
+         std::swap(s.angular_rate.x(), s.angular_rate.y());
+         std::swap(s.specific_force.x(), s.specific_force.y());
+       });
+       r.write(f / "log");
+     },
+     kNavigate,
+     0,
+     {"ERROR", "left-handed"}},
+    {"GyroscopesTurnedRound",
+     [](const fs::path& f) {
+       Recording r(2);
+       r.each_imu([](ImuSample& s) { s.angular_rate *= -1; });
+       r.write(f / "log");
+     },
+     kNavigate,
+     0,
+     {"ERROR", "other sign"}},
     {"OnlyTheGyroscopesForwardRightDown",
      [](const fs::path& f) {
        Recording r(1);

@@ -83,8 +83,13 @@ std::optional<Time> parse_stamp(std::string_view text, TimeUnit unit) {
 
 TimeUnit unit_of_frames(std::span<const std::string_view> stamps) {
   constexpr double kThousand = 1000;
-  constexpr double kSlowest = 10;  // s
-  if (!(median_step(stamps) >= kThousand)) return TimeUnit::seconds;
+  constexpr double kSlowest = 10;                           // s
+  constexpr double kYear1998 = 0.9e12, kYear2100 = 4.1e12;  // ms since 1970, as neither s nor us count
+  const double first = stamps.empty() ? 0 : number_of(stamps[stamps.size() / 2]);
+  const double step = median_step(stamps);
+  if (first > kYear1998 && first < kYear2100 && step >= 1 && step <= kThousand * kSlowest)
+    return TimeUnit::milliseconds;
+  if (!(step >= kThousand)) return TimeUnit::seconds;
   const auto unit = guess_unit(stamps, kSlowest);
   return unit.value_or(TimeUnit::seconds) == TimeUnit::milliseconds ? TimeUnit::microseconds
                                                                     : unit.value_or(TimeUnit::seconds);

@@ -26,7 +26,8 @@ std::optional<TimeUnit> guess_unit(std::span<const std::string_view> stamps, dou
 std::optional<Time> parse_stamp(std::string_view text, TimeUnit unit);
 
 /// The same for the stamps of images and poses, which may also be minutes apart: seconds, unless they are a
-/// thousand and more apart (median) and fit microseconds or nanoseconds.
+/// thousand and more apart (median) and fit microseconds or nanoseconds, or are as large as milliseconds
+/// since 1970.
 TimeUnit unit_of_frames(std::span<const std::string_view> stamps);
 
 /// The median distance between neighbouring stamps, in what they count; NaN if there are none.

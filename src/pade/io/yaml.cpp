@@ -60,6 +60,17 @@ const Yaml* Yaml::find(std::string_view key) const {
   return nullptr;
 }
 
+namespace {
+
+/// Line `number`, from 0.
+std::string_view line_of(std::string_view text, int number) {
+  for (; number > 0 && !text.empty(); --number)
+    text.remove_prefix(std::min(text.find('\n'), text.size() - 1) + 1);
+  return text.substr(0, text.find_first_of("\r\n"));
+}
+
+}  // namespace
+
 Result<Yaml> parse_yaml(std::string_view text, const std::string& file) {
   try {
     Yaml root;
@@ -67,7 +78,8 @@ Result<Yaml> parse_yaml(std::string_view text, const std::string& file) {
     if (problem) return Error{fmt::format("{}: {}", file, *problem)};
     return root;
   } catch (const YAML::Exception& e) {
-    return Error{fmt::format("{}: line {}: not valid YAML: {}", file, e.mark.line + 1, e.msg)};
+    return Error{fmt::format("{}: line {}: not valid YAML: {} in {}", file, e.mark.line + 1, e.msg,
+                             in_quotes(line_of(text, e.mark.line)))};
   } catch (const std::exception& e) {
     return Error{fmt::format("{}: not valid YAML: {}", file, e.what())};
   }

@@ -230,6 +230,7 @@ void UpdatableTree::apply(std::span<const CellUpdate> updates, MapChange& change
 void UpdatableTree::apply_below(octomap::OcTreeNode* node, bool created, unsigned depth,
                                 std::span<const CellUpdate> updates, MapChange& change) {
   if (updates.front().depth == depth) {
+    if (depth <= kTileDepth) change.touched.push_back(cell_of(updates.front().code, depth, resolution));
     apply_to_all(node, created, depth, updates.front(), change);
     return;
   }
@@ -242,6 +243,10 @@ void UpdatableTree::apply_below(octomap::OcTreeNode* node, bool created, unsigne
     if (value <= clamping_thres_min && std::all_of(updates.begin(), updates.end(), says(false))) return;
     if (value >= clamping_thres_max && std::all_of(updates.begin(), updates.end(), says(true))) return;
     expandNode(node);
+  }
+  if (depth == kTileDepth) {
+    const unsigned below = bits_below(depth);
+    change.touched.push_back(cell_of(updates.front().code >> below << below, depth, resolution));
   }
   const unsigned shift = bits_below(depth + 1);
   while (!updates.empty()) {

@@ -14,7 +14,8 @@
 
 namespace pade::mapping {
 
-inline constexpr int kTreeCentre = 32768;  // key of the voxel just above the origin
+inline constexpr unsigned kTileDepth = kTreeDepth - 3;  // in the octree, of a cube of 8 voxels to a side
+inline constexpr int kTreeCentre = 32768;               // key of the voxel just above the origin
 
 /// Keys interleaved bit by bit, x lowest: sorting by it walks the octree depth first.
 std::uint64_t morton_code(const octomap::OcTreeKey& key);

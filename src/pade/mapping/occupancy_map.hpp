@@ -93,7 +93,10 @@ struct MapCell {
 struct MapChange {
   std::vector<MapCell> became_occupied;  ///< from unknown or from free
   std::vector<MapCell> became_free;      ///< from unknown or from occupied
-  std::size_t hits = 0;                  ///< voxels that got a hit
+  /// Cubes of 8 voxels to a side, or larger ones, in which an occupancy may have changed: what a MapView
+  /// takes over.
+  std::vector<MapCell> touched;
+  std::size_t hits = 0;          ///< voxels that got a hit
   std::size_t pending_hits = 0;  ///< voxels, of this image and earlier ones, that wait for another look
   std::size_t pending_free = 0;  ///< voxels that this image shows free, and no earlier one from another place
   std::size_t too_uncertain = 0;  ///< pixels whose sigma is above hit_max_relative_sigma

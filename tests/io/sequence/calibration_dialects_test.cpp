@@ -71,6 +71,12 @@ INSTANTIATE_TEST_SUITE_P(
                     "240.75, 0.0, 0.0, 0.0, 1.0, 0.0]\nbinning_x: 0\nbinning_y: 0\nroi: \n  x_offset: 0\n  "
                     "height: "
                     "0\n  width: 0\n  do_rectify: False\n---\nheader: \n  seq: 5\n"},
+        Written{
+            "RosIni", "ROS camera_info (INI)",
+            "# oST version 5.0 "
+            "parameters\n\n\n[image]\n\nwidth\n640\n\nheight\n480\n\n[narrow_stereo]\n\ncamera "
+            "matrix\n400.5 0.0 320.25\n0.0 401.5 240.75\n0.0 0.0 1.0\n\ndistortion\n-0.3 0.1 0.001 -0.002 "
+            "0.0\n\nrectification\n1 0 0\n0 1 0\n0 0 1\n\nprojection\n390 0 310 0\n0 390 230 0\n0 0 1 0\n"},
         Written{"Ros2Echo", "ROS camera_info",
                 "header:\n  frame_id: c\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\nd:\n" +
                     listed({-0.3, 0.1, 0.001, -0.002, 0}) + "k:\n" +
@@ -251,7 +257,23 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"XmlMatrixOfWords",
                 "<opencv_storage>\n" + xml_matrix("camera_matrix", 3, 3, "a b c d e f g h i") +
                     "</opencv_storage>\n",
-                "line 2: field camera_matrix"},
+                "field camera_matrix: found \"a\""},
+        Refused{"XmlMatrixWithNan",
+                "<opencv_storage>\n" + xml_matrix("camera_matrix", 3, 3, "400 0 .Nan 0 400 240 0 0 1") +
+                    "</opencv_storage>\n",
+                "field camera_matrix: found \".Nan\""},
+        Refused{"MatrixOfAnotherSize", "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [400, 0, 320]\n",
+                "line 4: field camera_matrix: found a list of 3 values"},
+        Refused{"VinsWithTheLensElsewhere",
+                "%YAML:1.0\nimu: 1\ncam0_calib: \"cam0_mei.yaml\"\nestimate_extrinsic: 0\n",
+                "line 3: field cam0_calib: the lens is in another file, \"cam0_mei.yaml\""},
+        Refused{"ReportOfKalibr", "Calibration results\n===\nCamera-system parameters:\ncam0 (/image):\n",
+                "expected the camchain.yaml"},
+        Refused{"Binary", std::string("\1\0\0\0\0\0\0\0", 8), "colmap model_converter"},
+        Refused{"NoYaml", "width: 640\nA message was lost!!!\n\ttotal: 1\n", "not valid YAML"},
+        Refused{"IniWithoutAMatrix",
+                "[image]\n\nwidth\n640\n\nheight\n480\n\n[camera]\n\ndistortion\n0 0 0 0 0\n",
+                "section [camera] expected width and height"},
         Refused{"ThinPrism",
                 "image_width: 640\nimage_height: 480\ncamera_matrix:\n  data: [1, 0, 1, 0, 1, 1, 0, 0, "
                 "1]\ndistortion_model: rational_polynomial\ndistortion_coefficients:\n  data: [1, 1, 1, 1, "
@@ -282,6 +304,22 @@ TEST(KalibrChain, AnyCameraGetsItsMountingThroughTheChain) {
     EXPECT_LT((read->T_body_camera->translation - expected.translation).norm(), 1e-12);
     EXPECT_LT(test::rotation_difference(*read->T_body_camera, expected), 1e-12);
   }
+}
+
+TEST(Mountings, OfRtabMapIsThatOfTheCameraOnTheBase) {
+  const auto read = parse_calibration(
+      "image_width: 640\nimage_height: 480\ndistortion_model: plumb_bob\ncamera_matrix: {data: [400, 0, 320, "
+      "0, 400, "
+      "240, 0, 0, 1]}\ndistortion_coefficients: {data: [0, 0, 0, 0, 0]}\nlocal_transform: {rows: 3, cols: 4, "
+      "data: [0, "
+      "0, 1, 0.1, -1, 0, 0, 0.2, 0, -1, 0, 0.3]}\n",
+      "calib.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_TRUE(read->T_body_camera);
+  EXPECT_LT((read->T_body_camera->translation - Eigen::Vector3d(0.1, 0.2, 0.3)).norm(), 1e-12);
+  EXPECT_LT((read->T_body_camera->rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(),
+            1e-9)
+      << "it looks ahead";
 }
 
 TEST(Mountings, OfOrbSlamAndVinsAreThoseOfTheCameraInTheBody) {

@@ -44,14 +44,15 @@ cv::Mat some_depth(const Camera& camera) {
   return depth;
 }
 
-void write_npy(const std::filesystem::path& file, const cv::Mat& depth, const char* type = "<f4") {
+void write_npy(const std::filesystem::path& file, const cv::Mat& depth, const char* type = "<f4",
+               std::size_t each = sizeof(float)) {
   std::string header = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", type,
                                    depth.rows, depth.cols);
   while ((10 + header.size() + 1) % 64 != 0) header += ' ';
   header += '\n';
   std::string bytes =
       std::string("\x93NUMPY\x01", 7) + '\0' + static_cast<char>(header.size()) + '\0' + header;
-  bytes.append(reinterpret_cast<const char*>(depth.data), depth.total() * sizeof(float));
+  bytes.append(reinterpret_cast<const char*>(depth.data), depth.total() * each);
   test::write_text(file, bytes);
 }
 
@@ -127,6 +128,32 @@ TEST(TartanAirFolder, OfTheSecondVersionHasDepthInTheBytesOfAnImage) {
   expect_depth(*sequence, depth, 1e-6);
 }
 
+TEST(TartanAirFolder, OfTheSecondVersionHasTwelveCameras) {
+  for (const char* name : {"lcam_back", "rcam_top"}) {
+    const TemporaryFolder folder;
+    const Flight flight = flight_of({640, 640, 320, 320, 320, 320, Distortion::none, {}}, 100'000'000, 0);
+    for (std::size_t i = 0; i < flight.size(); ++i) {
+      test::write_image(folder / fmt::format("image_{}", name) / fmt::format("{:06}_{}.png", i, name),
+                        flight.images[i]);
+    }
+    test::write_text(folder / fmt::format("pose_{}.txt", name), forward_right_down(flight));
+    const auto sequence = Sequence::open(folder.path());
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    expect_is(*sequence, flight);
+  }
+}
+
+TEST(TartanAirFolder, WithoutPosesSaysWhichRowsItExpects) {
+  const TemporaryFolder folder;
+  const Flight flight = flight_of({640, 480, 320, 320, 320, 240, Distortion::none, {}}, 100'000'000, 0);
+  for (std::size_t i = 0; i < flight.size(); ++i)
+    test::write_image(folder / "image_left" / fmt::format("{:06}_left.png", i), flight.images[i]);
+  test::write_text(folder / "pose_left.txt", "");
+  const auto sequence = Sequence::open(folder.path());
+  ASSERT_FALSE(sequence);
+  EXPECT_THAT(sequence.error().message, HasSubstr("row i for image i"));
+}
+
 TEST(TartanAirFolder, MayStartLater) {
   const TemporaryFolder folder;
   Flight flight = flight_of({640, 480, 320, 320, 320, 240, Distortion::none, {}}, 100'000'000, 0);
@@ -175,6 +202,25 @@ TEST(IclNuimFolder, IsTurnedRightHanded) {
   EXPECT_EQ(sequence->world_up()->direction, Eigen::Vector3d(0, -1, 0));
 }
 
+TEST(DepthFile, ReadsFloatsOfAnySize) {
+  const TemporaryFolder folder;
+  const std::vector<double> doubles = {2.5, 1e4, 0.25, 3, 4, 5};
+  std::vector<Eigen::half> halves;
+  for (const double value : doubles) halves.emplace_back(static_cast<float>(value));
+  const auto write = [&](const char* name, const char* type, const void* values, std::size_t size) {
+    const cv::Mat bytes(2, 3, CV_32FC1, const_cast<void*>(values));
+    write_npy(folder / name, bytes, type, size);
+    return read_depth_file(folder / name);
+  };
+  const auto wide = write("wide.npy", "<f8", doubles.data(), sizeof(double));
+  const auto narrow = write("narrow.npy", "<f2", halves.data(), sizeof(Eigen::half));
+  for (const auto* read : {&wide, &narrow}) {
+    ASSERT_TRUE(*read) << read->error().message;
+    for (int i = 0; i < 6; ++i)
+      EXPECT_EQ((*read)->at<float>(i / 3, i % 3), static_cast<float>(doubles[static_cast<std::size_t>(i)]));
+  }
+}
+
 TEST(DepthFile, RefusesArraysThatAreNoDepth) {
   const TemporaryFolder folder;
   const cv::Mat depth(4, 6, CV_32FC1, cv::Scalar(2));
@@ -184,8 +230,10 @@ TEST(DepthFile, RefusesArraysThatAreNoDepth) {
   };
   write_npy(folder / "good.npy", depth);
   EXPECT_EQ(message("good.npy"), "");
-  write_npy(folder / "doubles.npy", depth, "<f8");
-  EXPECT_THAT(message("doubles.npy"), HasSubstr("expected a .npy array of rows x columns"));
+  write_npy(folder / "big-endian.npy", depth, ">f4");
+  EXPECT_THAT(message("big-endian.npy"), HasSubstr("expected a .npy array of rows x columns"));
+  write_npy(folder / "integers.npy", depth, "<i4");
+  EXPECT_THAT(message("integers.npy"), HasSubstr("expected a .npy array of rows x columns"));
   test::write_text(folder / "text.npy", "not an array");
   EXPECT_THAT(message("text.npy"), HasSubstr("text.npy: expected a .npy array"));
   std::string bytes = test::read_bytes(folder / "good.npy");

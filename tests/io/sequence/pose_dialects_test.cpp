@@ -34,7 +34,76 @@ std::string kitti(std::int64_t, const Pose& pose) {
   return text;
 }
 
+/// x y z and the quaternion in one order ("xyzw", "wxyz"), each behind the separator.
+std::string values(const Pose& pose, std::string_view order, const std::string& separator) {
+  std::string text;
+  for (int i = 0; i < 3; ++i) text += separator + fmt::format("{:.17g}", pose.translation[i]);
+  for (const char c : order) {
+    const auto& q = pose.rotation;
+    text += separator + fmt::format("{:.17g}", c == 'w'   ? q.w()
+                                               : c == 'x' ? q.x()
+                                               : c == 'y' ? q.y()
+                                                          : q.z());
+  }
+  return text;
+}
+
+std::string with_commas(std::string text) {
+  std::replace(text.begin(), text.end(), '.', ',');
+  return text;
+}
+
 const Dialect kDialects[] = {
+    {"RosEcho",
+     "%time,field.header.seq,field.header.frame_id,field.pose.pose.position.x,field.pose.pose.position.y,"
+     "field.pose.pose.position.z,field.pose.pose.orientation.x,field.pose.pose.orientation.y,"
+     "field.pose.pose.orientation.z,field.pose.pose.orientation.w,field.twist.twist.linear.x\n",
+     [](std::int64_t t, const Pose& p) { return fmt::format("{},7,map{},0\n", t, values(p, "xyzw", ",")); }},
+    {"PlotJuggler",
+     "__time,/odom/pose/position/x,/odom/pose/position/y,/odom/pose/position/z,/odom/pose/orientation/x,"
+     "/odom/pose/orientation/y,/odom/pose/orientation/z,/odom/pose/orientation/w\n",
+     [](std::int64_t t, const Pose& p) { return to_string(Time{t}) + values(p, "xyzw", ",") + "\n"; }},
+    {"Px4", "timestamp,x,y,z,q[0],q[1],q[2],q[3]\n",
+     [](std::int64_t t, const Pose& p) { return fmt::format("{}{}\n", t / 1000, values(p, "wxyz", ",")); }},
+    {"Maplab",
+     "timestamp [ns], vertex index, position x [m], position y [m], position z [m], quaternion x, quaternion "
+     "y, "
+     "quaternion z, quaternion w\n",
+     [](std::int64_t t, const Pose& p) { return fmt::format("{}, 0{}\n", t, values(p, "xyzw", ", ")); }},
+    {"OpenVins", "# timestamp(s) tx ty tz qx qy qz qw Pr11\n",
+     [](std::int64_t t, const Pose& p) { return to_string(Time{t}) + values(p, "xyzw", " ") + " 0.1\n"; }},
+    {"AirSim", "VehicleName\tTimeStamp [ms]\tPOS_X\tPOS_Y\tPOS_Z\tQ_W\tQ_X\tQ_Y\tQ_Z\tImageFile\n",
+     [](std::int64_t t, const Pose& p) {
+       return fmt::format("drone\t{}{}\ta.png\n", t / 1'000'000, values(p, "wxyz", "\t"));
+     }},
+    {"MillisecondsSince1970", "",
+     [](std::int64_t t, const Pose& p) {
+       return fmt::format("{}{}\n", t / 1'000'000, values(p, "xyzw", " "));
+     }},
+    {"SecondsAndNanoseconds", "secs,nsecs,x,y,z,qx,qy,qz,qw\n",
+     [](std::int64_t t, const Pose& p) {
+       return fmt::format("{},{}{}\n", t / 1'000'000'000, t % 1'000'000'000, values(p, "xyzw", ","));
+     }},
+    {"DecimalCommas", "time;x;y;z;qx;qy;qz;qw\n",
+     [](std::int64_t t, const Pose& p) {
+       return with_commas(to_string(Time{t}) + values(p, "xyzw", ";")) + "\n";
+     }},
+    {"DecimalCommasBetweenTabs", "",
+     [](std::int64_t t, const Pose& p) {
+       return with_commas(to_string(Time{t}) + values(p, "xyzw", "\t")) + "\n";
+     }},
+    {"Vins", "",
+     [](std::int64_t t, const Pose& p) {
+       return fmt::format("{}{},0.1,0.2,0.3,\n", t, values(p, "wxyz", ","));
+     }},
+    {"TimeAndMatrix", "",
+     [](std::int64_t t, const Pose& p) { return to_string(Time{t}) + " " + kitti(t, p); }},
+    {"TimeAndWholeMatrix", "",
+     [](std::int64_t t, const Pose& p) {
+       std::string row = to_string(Time{t}) + " " + kitti(t, p);
+       row.back() = ' ';
+       return row + "0 0 0 1\n";
+     }},
     {"Tum", "# t x y z\n",
      [](std::int64_t t, const Pose& p) { return test::pose_row(to_string(Time{t}), p); }},
     {"TumWithMoreColumns", "",
@@ -107,6 +176,33 @@ TEST(PoseDialect, NamesTheLineOfWhatIsNone) {
   const auto none = parse_any_poses("# nothing\nfoo bar\n1 2 3\n", "p.txt", {}, report);
   ASSERT_FALSE(none);
   EXPECT_THAT(none.error().message, HasSubstr("line 3: found 3 fields"));
+}
+
+TEST(PoseDialect, RefusesAHeadingThatItDoesNotUnderstand) {
+  const auto message = [](const std::string& text) {
+    ReadReport report;
+    const auto read = parse_any_poses(text, "p.txt", {}, report);
+    return read ? std::string("read") : read.error().message;
+  };
+  const std::string row = "0 47.1 8.2 400 0 0 0 1\n0.1 47.1 8.2 400 0 0 0 1\n";
+  EXPECT_THAT(message("time lat lon alt qx qy qz qw\n" + row),
+              testing::AllOf(HasSubstr("p.txt: line 1: found columns time, lat"), HasSubstr("gnss.csv")));
+  EXPECT_THAT(message("# time lat lon alt qx qy qz qw\n" + row), HasSubstr("line 1: found columns"));
+  EXPECT_THAT(message("time,x,y,z,roll,pitch,yaw\n0,1,2,3,0,0,0\n"),
+              HasSubstr("angles must be made quaternions"));
+  EXPECT_THAT(message("frame,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n"), HasSubstr("none of them a time"));
+  EXPECT_THAT(message("#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n1 1 0 0 0 1 2 3 1 a.png\n"),
+              HasSubstr("COLMAP's images.txt"));
+  EXPECT_THAT(message("1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n"), HasSubstr("4x4 matrix over four lines"));
+  for (const char* remark : {"# my notes, of a day, in May\n", "# poses of a flight through the old yard\n"})
+    EXPECT_THAT(message(remark + row), "read") << "a remark is no heading";
+}
+
+TEST(PoseDialect, WondersAboutMilliseconds) {
+  const auto far =
+      Trajectory({{Time::from_seconds(0), {}}, {Time::from_seconds(100), {}}}).at(Time::from_seconds(3), 0.5);
+  ASSERT_FALSE(far);
+  EXPECT_THAT(far.error().message, HasSubstr("stamps in milliseconds?"));
 }
 
 TEST(ImageLists, HoldNamesWithBlanks) {

@@ -63,6 +63,54 @@ std::optional<FoundTriple> find_triple(const NumericTable& table, std::span<cons
   return std::nullopt;
 }
 
+std::optional<double> length_scale(std::string_view unit) {
+  static constexpr std::array<std::pair<std::string_view, double>, 12> kUnits = {{{"", 1},
+                                                                                  {"m", 1},
+                                                                                  {"meter", 1},
+                                                                                  {"meters", 1},
+                                                                                  {"metres", 1},
+                                                                                  {"km", 1000},
+                                                                                  {"dm", 0.1},
+                                                                                  {"cm", 0.01},
+                                                                                  {"mm", 1e-3},
+                                                                                  {"ft", 0.3048},
+                                                                                  {"feet", 0.3048},
+                                                                                  {"m(msl)", 1}}};
+  for (const auto& [name, scale] : kUnits) {
+    if (unit == name) return scale;
+  }
+  return std::nullopt;
+}
+
+std::optional<double> speed_scale(std::string_view unit) {
+  constexpr double kKnot = 1852.0 / 3600, kMile = 1609.344 / 3600;
+  static constexpr std::array<std::pair<std::string_view, double>, 16> kUnits = {{{"", 1},
+                                                                                  {"m/s", 1},
+                                                                                  {"mps", 1},
+                                                                                  {"ms^-1", 1},
+                                                                                  {"m/sec", 1},
+                                                                                  {"km/h", 1 / 3.6},
+                                                                                  {"kmh", 1 / 3.6},
+                                                                                  {"kph", 1 / 3.6},
+                                                                                  {"cm/s", 0.01},
+                                                                                  {"mm/s", 1e-3},
+                                                                                  {"kn", kKnot},
+                                                                                  {"kt", kKnot},
+                                                                                  {"kts", kKnot},
+                                                                                  {"knots", kKnot},
+                                                                                  {"mph", kMile},
+                                                                                  {"ft/s", 0.3048}}};
+  for (const auto& [name, scale] : kUnits) {
+    if (unit == name) return scale;
+  }
+  return std::nullopt;
+}
+
+Error unknown_unit(const NumericTable& table, std::size_t column, std::string_view expected) {
+  return Error{fmt::format("{}: found unit '{}' of {}, expected {}", table.name, table.columns[column].unit,
+                           table.columns[column].name, expected)};
+}
+
 void remark_left_out(const NumericTable& table, std::size_t left_out, std::vector<std::string>& remarks) {
   if (left_out + table.bad_lines == 0) return;
   remarks.push_back(

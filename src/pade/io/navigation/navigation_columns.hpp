@@ -52,6 +52,12 @@ struct FoundTriple {
 };
 std::optional<FoundTriple> find_triple(const NumericTable& table, std::span<const TripleNames> candidates);
 
+/// Scale to metres and to metres per second from the unit of a heading; empty where the unit is unknown.
+std::optional<double> length_scale(std::string_view unit);
+std::optional<double> speed_scale(std::string_view unit);
+/// Refuses the unit of a column.
+Error unknown_unit(const NumericTable& table, std::size_t column, std::string_view expected);
+
 /// Says how many rows were left out, if any were.
 void remark_left_out(const NumericTable& table, std::size_t left_out, std::vector<std::string>& remarks);
 

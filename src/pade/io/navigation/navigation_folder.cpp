@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/foreign_file.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/io/text.hpp"
@@ -60,6 +61,11 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
                                           const NavigationLogOptions& options) {
   namespace fs = std::filesystem;
   NavigationLog log;
+  std::error_code failure;
+  if (fs::is_regular_file(folder, failure)) {
+    return Error{fmt::format("{}: is a file, expected a folder with imu.csv and gnss.csv{}", folder.string(),
+                             advice_for(folder))};
+  }
   fs::path imu = folder / "imu.csv";
   fs::path truth = folder / "truth.csv";
   for (const fs::path& euroc : {folder / "mav0", folder}) {
@@ -70,8 +76,8 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   }
   if (!path_exists(imu)) imu = file_ending_with(folder, "-imu.csv");
   if (imu.empty())
-    return Error{
-        fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv", folder.string())};
+    return Error{fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv{}",
+                             folder.string(), found_files(folder, ".csv"))};
   const auto imu_text = read_file(imu);
   if (!imu_text) return imu_text.error();
   auto samples = parse_imu(*imu_text, imu.string(), log.remarks);
@@ -87,7 +93,8 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
     if (!gnss) return gnss.error();
     log.gnss = std::move(*gnss);
   } else {
-    log.remarks.push_back(fmt::format("{}: no GNSS log found, expected gnss.csv", folder.string()));
+    log.remarks.push_back(fmt::format("{}: no GNSS log found, expected gnss.csv{}", folder.string(),
+                                      found_files(folder, ".csv")));
   }
   auto barometer = read_optional(folder / "baro.csv", parse_barometer, log.remarks);
   if (!barometer) return barometer.error();

@@ -60,6 +60,11 @@ constexpr std::array kVelocitySigmas = {TripleNames{"gnss1::velu", "gnss1::velu"
                                         TripleNames{"sigma_vx", "sigma_vy", "sigma_vz"},
                                         TripleNames{"svx", "svy", "svz"}};
 
+constexpr std::array kRosVariances = {
+    TripleNames{"position_covariance0", "position_covariance4", "position_covariance8"},
+    TripleNames{"position_covariance[0]", "position_covariance[4]", "position_covariance[8]"},
+    TripleNames{"position_covariance.0", "position_covariance.4", "position_covariance.8"}};
+
 /// Where a value of a row comes from, and how it turns into east, north, up.
 struct Source {
   Triple triple;
@@ -74,6 +79,8 @@ struct Layout {
   std::optional<Triple> velocity_sigma;
   std::optional<std::size_t> instance, status;  ///< ArduPilot: number of the receiver, kind of the fix
   double least_status = 0;
+  bool variances = false;   ///< the sigmas of the position are squared, and those of east, north, up (ROS)
+  double height_scale = 1;  ///< of a geodetic position, to metres
   bool scaled_integers = false;  ///< 1e-7 degrees and millimetres, as PX4 and MAVLink have them
   StampRule stamps{{}, {}, 30};
 };
@@ -91,6 +98,43 @@ std::string names_of(std::span<const Names> candidates) {
     text += fmt::format("{}{} {} {}", text.empty() ? "" : ", ", one.names[0], one.names[1], one.names[2]);
   }
   return text;
+}
+
+/// Converts what is in another unit than metres, metres per second and degrees, by the heading.
+Status settle_units(Layout& layout, const NumericTable& table) {
+  constexpr std::string_view kLengths = "m, km, cm, mm or ft";
+  constexpr std::string_view kSpeeds = "m/s, km/h, cm/s, mm/s, knots, mph or ft/s";
+  const auto unit_of = [&](const Triple& triple, std::size_t i) -> std::string_view {
+    return table.columns[triple.column[i]].unit;
+  };
+  const auto settle = [&](Triple& triple, const auto& scale_of, std::string_view expected) -> Status {
+    const auto scale = scale_of(unit_of(triple, 0));
+    if (!scale) return unknown_unit(table, triple.column[0], expected);
+    triple.scale = *scale;
+    return {};
+  };
+  if (layout.position.axes == Axes::geodetic) {
+    for (const std::size_t i : {0, 1}) {
+      const std::string_view unit = unit_of(layout.position.triple, i);
+      const bool known = unit.empty() || unit.starts_with("deg") || unit == "\xc2\xb0" || unit == "1e-7deg";
+      if (!known) return unknown_unit(table, layout.position.triple.column[i], "degrees");
+    }
+    const auto height = length_scale(unit_of(layout.position.triple, 2));
+    if (!height) return unknown_unit(table, layout.position.triple.column[2], kLengths);
+    layout.height_scale = *height;
+  } else if (const Status s = settle(layout.position.triple, length_scale, kLengths); !s) {
+    return s;
+  }
+  if (layout.velocity) {
+    if (const Status s = settle(layout.velocity->triple, speed_scale, kSpeeds); !s) return s;
+  }
+  if (layout.position_sigma) {
+    if (const Status s = settle(*layout.position_sigma, length_scale, kLengths); !s) return s;
+  }
+  if (layout.velocity_sigma) {
+    if (const Status s = settle(*layout.velocity_sigma, speed_scale, kSpeeds); !s) return s;
+  }
+  return {};
 }
 
 /// What the comment says of x, y, z.
@@ -117,11 +161,19 @@ Status settle_axes(Source& source, const NumericTable& table, std::string_view w
   return {};
 }
 
-/// A latitude beyond any is an integer in 1e-7 degrees.
-bool has_scaled_integers(const NumericTable& table, const Triple& geodetic) {
+/// A latitude beyond any is an integer in 1e-7 degrees. Refused if it can be neither that nor degrees.
+Result<bool> has_scaled_integers(const NumericTable& table, const Triple& geodetic) {
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double latitude = table.at(row, geodetic.column[0]);
-    if (std::isfinite(latitude) && latitude != 0) return std::abs(latitude) > 1e4;
+    if (!std::isfinite(latitude) || latitude == 0) continue;
+    constexpr double kPole = 90, kLargestInMinutes = 1e4;
+    if (std::abs(latitude) <= kPole || std::abs(latitude) > kLargestInMinutes)
+      return std::abs(latitude) > kPole;
+    return Error{
+        fmt::format("{}: line {}: found latitude {}, expected degrees from -90 to 90: degrees and minutes "
+                    "(ddmm.mmmm), as NMEA has "
+                    "them, must be converted; or latitude and longitude have changed places",
+                    table.name, table.line_numbers[row], latitude)};
   }
   return false;
 }
@@ -161,8 +213,19 @@ Result<Layout> layout_of(const NumericTable& table) {
     layout.stamps.column = tow;
     layout.stamps.unit = TimeUnit::nanoseconds;
   }
+  if (const auto variances = find_triple(table, kRosVariances)) {
+    layout.position_sigma = variances->triple;
+    layout.variances = true;
+  }
+  if (const auto status = table.column("status.status")) {
+    layout.status = status;  // ROS NavSatFix: -1 is no fix
+    layout.least_status = 0;
+  }
+  if (const Status status = settle_units(layout, table); !status) return status.error();
   if (layout.position.axes == Axes::geodetic) {
-    layout.scaled_integers = has_scaled_integers(table, layout.position.triple);
+    const auto scaled = has_scaled_integers(table, layout.position.triple);
+    if (!scaled) return scaled.error();
+    layout.scaled_integers = *scaled;
   }
   return layout;
 }
@@ -218,6 +281,24 @@ void drop_repeats(GnssLog& log) {
                        log.velocities.end());
 }
 
+/// "vu beside ve, vn is missing", where two of three are there.
+std::string part_of_a_velocity(const NumericTable& table) {
+  for (const Names& one : kVelocities) {
+    std::string missing;
+    int there = 0;
+    for (const std::string_view name : one.names) {
+      if (table.column(name)) {
+        ++there;
+      } else {
+        missing = name;
+      }
+    }
+    if (there == 2)
+      return fmt::format("of {} {} {} there is no {}", one.names[0], one.names[1], one.names[2], missing);
+  }
+  return {};
+}
+
 void remark_sigmas(const NumericTable& table, const Layout& layout, const GnssDefaults& defaults,
                    std::size_t unknown, std::vector<std::string>& remarks) {
   const std::string taken =
@@ -232,10 +313,11 @@ void remark_sigmas(const NumericTable& table, const Layout& layout, const GnssDe
                                   table.name, unknown, taken));
   }
   if (!velocity) {
+    const std::string part = part_of_a_velocity(table);
     remarks.push_back(
         fmt::format("{}: no columns of velocity ({}): the yaw must come from a heading (--heading) or "
                     "mag.csv, and the scale of short motions is doubtful",
-                    table.name, names_of(kVelocities)));
+                    table.name, part.empty() ? names_of(kVelocities) : part));
   }
 }
 
@@ -263,24 +345,29 @@ Result<GnssLog> parse_gnss(std::string_view text, std::string_view name, const G
   const double instance = layout->instance ? table->at(0, *layout->instance) : 0;
   LocalFrame local;
   std::size_t left_out = 0;
+  std::size_t others = 0;
+  std::size_t without_fix = 0;
   std::size_t unknown = 0;
   for (std::size_t row = 0; row < table->rows(); ++row) {
     const auto time = (*times)[row];
     const bool other = layout->instance && table->at(row, *layout->instance) != instance;
     const bool no_fix = layout->status && !(table->at(row, *layout->status) >= layout->least_status);
     Vector3d position = layout->position.triple.at(*table, row);
+    if (geodetic) position[2] *= layout->height_scale;
     if (layout->scaled_integers) position = position.cwiseProduct(Vector3d(1e-7, 1e-7, 1e-3));
     const auto velocity = velocity_at(*table, *layout, row);
     const Axes velocity_axes = layout->velocity ? layout->velocity->axes : Axes::ned;
-    const Matrix3d position_covariance =
-        covariance_at(*table, row, layout->position_sigma, layout->position.axes, position_sigma, unknown);
+    Matrix3d position_covariance = covariance_at(
+        *table, row, layout->position_sigma, layout->variances ? Axes::enu : layout->position.axes,
+        layout->variances ? position_sigma.cwiseAbs2().eval() : position_sigma, unknown);
+    if (layout->variances) position_covariance = position_covariance.cwiseSqrt().eval();
     const Matrix3d velocity_covariance =
         covariance_at(*table, row, layout->velocity_sigma, velocity_axes, velocity_sigma, unknown);
     const bool on_earth = !geodetic || (std::abs(position[0]) <= 90 && std::abs(position[1]) <= 540);
     const bool has_fix = position.allFinite() && on_earth && position_covariance.allFinite();
     const bool has_velocity = velocity && velocity->allFinite() && velocity_covariance.allFinite();
-    if (!time || other || no_fix || (!has_fix && !has_velocity)) {
-      ++left_out;
+    if (other || no_fix || !time || (!has_fix && !has_velocity)) {
+      ++(other ? others : no_fix ? without_fix : left_out);
       continue;
     }
     if (has_fix) {
@@ -291,9 +378,16 @@ Result<GnssLog> parse_gnss(std::string_view text, std::string_view name, const G
   }
   drop_repeats(log);
   if (log.fixes.empty() && log.velocities.empty())
-    return Error{fmt::format("{}: no row with a stamp, a fix and a finite position or velocity", name)};
+    return Error{fmt::format("{}: no row with a stamp, a fix and a finite position or velocity; {}", name,
+                             table->first_defect(*times))};
   remark_sigmas(*table, *layout, defaults, unknown, remarks);
   remark_left_out(*table, left_out, remarks);
+  if (without_fix > 0)
+    remarks.push_back(fmt::format("{}: {} rows without a fix were left out", name, without_fix));
+  if (others > 0) {
+    remarks.push_back(
+        fmt::format("{}: {} rows of other receivers than number {:g} were left out", name, others, instance));
+  }
   return log;
 }
 

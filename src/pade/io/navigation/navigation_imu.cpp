@@ -51,11 +51,6 @@ constexpr std::array kDialects = {
             BodyFrame::flu,  // REP 103
             {}},
     Dialect{"ROS Imu",
-            {"field.angular_velocity.x", "field.angular_velocity.y", "field.angular_velocity.z"},
-            {"field.linear_acceleration.x", "field.linear_acceleration.y", "field.linear_acceleration.z"},
-            BodyFrame::flu,
-            TimeUnit::nanoseconds},
-    Dialect{"ROS Imu",
             {"angular_velocity_x", "angular_velocity_y", "angular_velocity_z"},
             {"linear_acceleration_x", "linear_acceleration_y", "linear_acceleration_z"},
             BodyFrame::flu,
@@ -220,7 +215,10 @@ Result<std::vector<ImuSample>> parse_imu(std::string_view text, std::string_view
     }
     samples.push_back({*time, to_flu(layout->frame, rate), to_flu(layout->frame, force)});
   }
-  if (samples.empty()) return Error{fmt::format("{}: no row with a stamp and six finite values", name)};
+  if (samples.empty()) {
+    return Error{
+        fmt::format("{}: no row with a stamp and six finite values; {}", name, table->first_defect(*times))};
+  }
   remark_left_out(*table, left_out, remarks);
   remark_step_back(*table, *times, remarks);
   if (others > 0) {

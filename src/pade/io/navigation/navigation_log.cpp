@@ -32,6 +32,8 @@ Result<std::vector<BarometricHeight>> parse_barometer(std::string_view text, std
     return Error{fmt::format("{}: found the columns {}; expected height_m, alt, altitude or baro_alt_meter",
                              name, table->column_names())};
   }
+  const auto scale = length_scale(table->columns[*height].unit);
+  if (!scale) return unknown_unit(*table, *height, "m, cm, mm or ft");
   const auto sigma = table->column("sigma");
   const auto times = times_of(*table, kSlowSensor, remarks);
   if (!times) return times.error();
@@ -39,7 +41,7 @@ Result<std::vector<BarometricHeight>> parse_barometer(std::string_view text, std
   std::size_t left_out = 0;
   for (std::size_t row = 0; row < table->rows(); ++row) {
     const auto time = (*times)[row];
-    const double value = table->at(row, *height);
+    const double value = *scale * table->at(row, *height);
     const double deviation = sigma ? table->at(row, *sigma) : 0.3;
     if (!time || !std::isfinite(value) || !std::isfinite(deviation)) {
       ++left_out;

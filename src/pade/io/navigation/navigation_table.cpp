@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/text.hpp"
+
 namespace pade::io {
 namespace {
 
@@ -36,9 +38,15 @@ std::string_view take(std::string_view& rest, char separator) {
   return head;
 }
 
+std::string_view unquoted(std::string_view text) {
+  text = trimmed(text);
+  const bool quoted = text.size() >= 2 && text.front() == '"' && text.back() == '"';
+  return quoted ? trimmed(text.substr(1, text.size() - 2)) : text;
+}
+
 /// @param decimal_comma  "0,5" is a half
 double number_or_nan(std::string_view text, bool decimal_comma) {
-  text = trimmed(text);
+  text = unquoted(text);
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   std::array<char, 64> with_point{};
   if (decimal_comma && text.size() < with_point.size() && text.find(',') != std::string_view::npos) {
@@ -52,9 +60,10 @@ double number_or_nan(std::string_view text, bool decimal_comma) {
 }
 
 bool is_unit(std::string_view text) {
-  static constexpr std::array<std::string_view, 24> kUnits = {
-      "s",   "ms", "us", "ns", "rad/s", "deg/s",   "dps", "m/s^2",  "m/s2", "m/s/s", "g",  "mg",
-      "m/s", "m",  "cm", "mm", "deg",   "degrees", "rad", "mrad/s", "hz",   "gauss", "ut", "seconds"};
+  static constexpr std::array<std::string_view, 34> kUnits = {
+      "s",    "ms",    "us",   "ns",   "rad/s", "deg/s",   "dps", "m/s^2",  "m/s2", "m/s/s", "g",  "mg",
+      "m/s",  "m",     "cm",   "mm",   "deg",   "degrees", "rad", "mrad/s", "hz",   "gauss", "ut", "seconds",
+      "km/h", "knots", "cm/s", "mm/s", "ft",    "feet",    "mph", "sec",    "km",   "rpm"};
   return std::find(kUnits.begin(), kUnits.end(), text) != kUnits.end();
 }
 
@@ -100,11 +109,31 @@ std::size_t count_fields(std::string_view line, char separator) {
   } while (true);
 }
 
+/// Members of ROS messages by which the path of a topic before them is known.
+constexpr std::array<std::string_view, 10> kMembers = {
+    "angular_velocity", "linear_acceleration", "latitude",       "longitude",      "altitude",
+    "status",           "position_covariance", "magnetic_field", "fluid_pressure", "header"};
+
+/// "field.latitude" (rostopic echo -p) and "/gps/fix/latitude" (PlotJuggler) are both latitude.
+std::string without_topic(std::string_view name) {
+  std::string text(name);
+  if (text.starts_with("field.")) return text.substr(6);
+  if (!text.starts_with('/')) return text;
+  std::replace(text.begin(), text.end(), '/', '.');
+  for (const std::string_view member : kMembers) {
+    const std::size_t at = text.find("." + std::string(member));
+    const char after =
+        at == std::string::npos || at + 1 + member.size() >= text.size() ? '.' : text[at + 1 + member.size()];
+    if (at != std::string::npos && (after == '.' || after == '[')) return text.substr(at + 1);
+  }
+  return text;
+}
+
 /// "acc_x_mps2" and "acc_x [m/s^2]" are both acc_x in m/s².
 ColumnName column_name(std::string_view field) {
   ColumnName column;
   std::string text = lower(trimmed(field));
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  text = without_topic(unquoted(text));
   // [0], [1] ... are indices, anything else in brackets is a unit.
   const std::size_t open = text.find('[');
   const bool index = open != std::string::npos && open + 1 < text.size() &&
@@ -148,13 +177,44 @@ std::vector<ColumnName> split_heading(std::string_view line, char separator) {
   }
 }
 
+/// A stamp, with a point where semicolons or tabs separate fields and a comma stands for it.
+std::string_view stamp_of(NumericTable& table, std::string_view field, char separator) {
+  const std::size_t comma = field.find(',');
+  if ((separator != ';' && separator != '\t') || comma == std::string_view::npos) return field;
+  if (!table.converted) table.converted = std::make_shared<std::deque<std::string>>();
+  std::string& text = table.converted->emplace_back(field);
+  text[comma] = '.';
+  return text;
+}
+
 /// A plain line that names columns: its first field is a word.
 bool is_heading(std::string_view first) {
   if (!first.empty() && (first.front() == '"' || first.front() == '%')) first.remove_prefix(1);
-  return !first.empty() && std::isalpha(static_cast<unsigned char>(first.front())) != 0 && first != "nan";
+  if (first.starts_with("nan") || first.empty()) return false;
+  return std::isalpha(static_cast<unsigned char>(first.front())) != 0 || first.front() == '_' ||
+         first.front() == '/';
 }
 
-constexpr std::array<std::string_view, 16> kTimeNames = {
+/// Gives the columns the units of a line below the heading; false where it is none.
+bool take_units(std::vector<ColumnName>& columns, std::string_view line, char separator) {
+  if (count_fields(line, separator) != columns.size()) return false;
+  std::vector<std::string> units;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    std::string unit = without_blanks(lower(unquoted(take(line, separator))));
+    if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '('))
+      unit = unit.substr(1, unit.size() - 2);
+    if (!unit.empty() && unit != "-" && !is_unit(unit)) return false;
+    units.push_back(unit == "-" ? "" : unit);
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (!units[i].empty()) columns[i].unit = units[i];
+  }
+  return true;
+}
+
+constexpr std::array<std::string_view, 17> kTimeNames = {
+    "__time",  // PlotJuggler
+
     "t_s",     "t",       "time",   "time_s",       "times",   "timestamp",    "timestamp_s", "stamp",
     "time_ns", "time_us", "timeus", "timestamp_ns", "time_ms", "timestamp_us", "time_usec",   "%time"};
 
@@ -167,8 +227,9 @@ std::size_t find_stamp_column(const std::vector<ColumnName>& columns) {
 
 /// What the heading says about its stamps.
 std::optional<TimeUnit> stated_unit(const ColumnName& column) {
-  static constexpr std::array<std::pair<std::string_view, TimeUnit>, 18> kNames = {
+  static constexpr std::array<std::pair<std::string_view, TimeUnit>, 19> kNames = {
       {{"t_s", TimeUnit::seconds},
+       {"__time", TimeUnit::seconds},
        {"time_s", TimeUnit::seconds},
        {"times", TimeUnit::seconds},
        {"timestamp_s", TimeUnit::seconds},
@@ -217,6 +278,17 @@ std::string NumericTable::column_names() const {
   return text;
 }
 
+std::string NumericTable::first_defect(const std::vector<std::optional<Time>>& times) const {
+  if (line_numbers.empty()) return "no rows";
+  const std::size_t line = line_numbers.front();
+  if (!times.empty() && !times.front()) {
+    return fmt::format(
+        "line {}: found time {}, expected a number of seconds, milliseconds, microseconds or nanoseconds",
+        line, in_quotes(stamps.front()));
+  }
+  return fmt::format("line {}: {}", line, in_quotes(first_row));
+}
+
 Result<std::vector<std::optional<Time>>> times_of(const NumericTable& table, const StampRule& rule,
                                                   std::vector<std::string>& remarks) {
   std::vector<std::optional<Time>> times;
@@ -255,6 +327,7 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
   table.name = name;
   char separator = ',';
   std::size_t line_number = 0;
+  std::string words;  // the last comment that may name columns between blanks
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   while (!text.empty()) {
     const std::string_view whole_line = take(text, '\n');
@@ -270,21 +343,35 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
           heading.find('=') == std::string::npos) {
         separator = candidate;
         table.columns = split_heading(heading, separator);
+      } else if (candidate == ' ' && count_fields(heading, ' ') > 3) {
+        words = heading;
       }
       continue;
     }
     if (table.rows() == 0 && table.bad_lines == 0 &&
         is_heading(line.substr(0, line.find_first_of(",; \t")))) {
       const std::string heading = without_parentheses(line);
+      if (table.columns.size() > 1 && take_units(table.columns, line, separator)) continue;
       separator = separator_of(heading);
       table.columns = split_heading(heading, separator);
       continue;
     }
-    if (table.columns.empty()) {
-      return Error{fmt::format("{}:{}: found '{}', expected a heading with the names of the columns", name,
-                               line_number, line.substr(0, 40))};
+    if (const char by = separator_of(line); table.columns.empty() && count_fields(line, by) > 1 &&
+                                            is_heading(words) &&
+                                            count_fields(trimmed(words), ' ') == count_fields(line, by)) {
+      table.columns = split_heading(words, ' ');
+      separator = by;
     }
-    if (table.rows() == 0) table.stamp_column = find_stamp_column(table.columns);
+    if (table.columns.empty()) {
+      return Error{
+          fmt::format("{}:{}: found '{}', expected a heading with the names of the columns "
+                      "(docs/formats.md), as \"t_s,gx,gy,gz,ax,ay,az\"",
+                      name, line_number, line.substr(0, 40))};
+    }
+    if (table.rows() == 0) {
+      table.stamp_column = find_stamp_column(table.columns);
+      table.first_row = line;
+    }
     // An empty field at the end of a line of tabs is a field.
     std::string_view rest = separator == '\t' ? whole_line.substr(0, whole_line.find('\r')) : line;
     if (count_fields(rest, separator) != table.width()) {
@@ -294,7 +381,7 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
     for (std::size_t i = 0; i < table.width(); ++i) {
       const std::string_view field = trimmed(take(rest, separator));
       table.values.push_back(number_or_nan(field, separator == ';' || separator == '\t'));
-      if (i == table.stamp_column) table.stamps.push_back(field);
+      if (i == table.stamp_column) table.stamps.push_back(stamp_of(table, unquoted(field), separator));
     }
     table.line_numbers.push_back(line_number);
   }

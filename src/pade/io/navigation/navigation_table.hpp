@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <initializer_list>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -32,6 +34,8 @@ struct NumericTable {
   std::vector<std::size_t> line_numbers;  ///< of each row, from 1
   std::size_t bad_lines = 0;              ///< lines with another number of fields, left out
   std::size_t first_bad_line = 0;
+  std::shared_ptr<std::deque<std::string>> converted;  ///< stamps that had decimal commas
+  std::string_view first_row;                          ///< the first line of data, for messages
 
   [[nodiscard]] std::size_t width() const { return columns.size(); }
   [[nodiscard]] std::size_t rows() const { return line_numbers.size(); }
@@ -43,12 +47,16 @@ struct NumericTable {
   [[nodiscard]] std::optional<std::size_t> column(std::initializer_list<std::string_view> wanted) const;
   /// The names of the columns as a list, for messages.
   [[nodiscard]] std::string column_names() const;
+  /// "line 3: found time "noon", expected seconds": why no row could be used, by the first of them.
+  [[nodiscard]] std::string first_defect(const std::vector<std::optional<Time>>& times) const;
 };
 
 /// Parses text whose fields are separated by commas, semicolons, tabs or blanks, whichever the heading uses
 /// (with semicolons and tabs a decimal comma is understood). The heading is the last '#' line with at least
-/// two fields before the data, or a plain first line whose first field is not a number. `text` must outlive
-/// the table. Errors: no heading, no row, more than half of the lines with the wrong number of fields.
+/// two fields before the data, or a plain first line whose first field is not a number; a second line of
+/// units is taken for those of the columns. Fields may be quoted. The paths of ROS topics before a name go
+/// ("/imu/data/angular_velocity/x" is angular_velocity.x). `text` must outlive the table. Errors: no heading,
+/// no row, more than half of the lines with the wrong number of fields.
 Result<NumericTable> parse_table(std::string_view text, std::string_view name);
 
 /// What a dialect knows of its stamps beyond what the heading says.

@@ -147,12 +147,22 @@ std::string_view lens_name(Distortion model) {
 
 Result<Calibration> parse_calibration(std::string_view text, const std::string& file, int camera) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  const bool utf16 = text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF");
+  if (!utf16 && text.substr(0, 4096).find('\0') != std::string_view::npos) {
+    return Error{
+        fmt::format("{}: found binary data, expected text: of COLMAP's cameras.bin make cameras.txt (colmap "
+                    "model_converter "
+                    "--output_type TXT), of NumPy's arrays a camera.yaml (docs/formats.md)",
+                    file)};
+  }
   if (auto read = dialect::read_text_dialect(text, file, camera)) return std::move(*read);
   const auto root = parse_tree(text, file);
   if (!root) return root.error();
   if (root->kind != Yaml::Kind::map) {
     return Error{
-        fmt::format("{}: found {}, expected the fields of a camera calibration", file, described(*root))};
+        fmt::format("{}: found {}, expected the fields of a camera calibration (known dialects: "
+                    "docs/formats.md)",
+                    file, described(*root))};
   }
   if (dialect::is_kalibr(*root)) return dialect::read_kalibr(*root, file, camera);
   if (dialect::is_orb_slam(*root)) return dialect::read_orb_slam(*root, file, camera);

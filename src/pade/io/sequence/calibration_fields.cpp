@@ -116,24 +116,27 @@ std::optional<std::string> CalibrationFields::text(std::string_view name, std::s
   return node->scalar;
 }
 
-bool CalibrationFields::append_numbers(const Yaml& node, std::vector<double>& out) const {
+const Yaml* CalibrationFields::append_numbers(const Yaml& node, std::vector<double>& out) const {
   if (node.kind == Yaml::Kind::list) {
-    return std::all_of(node.list.begin(), node.list.end(),
-                       [&](const Yaml& child) { return append_numbers(child, out); });
+    for (const Yaml& child : node.list) {
+      if (const Yaml* bad = append_numbers(child, out)) return bad;
+    }
+    return nullptr;
   }
   if (node.kind == Yaml::Kind::map) {
     const Yaml* data = node.find("data");
     const Yaml* rows = node.find("rows");
     const Yaml* cols = node.find("cols");
-    if (data == nullptr || data->kind != Yaml::Kind::list || !append_numbers(*data, out)) return false;
-    if (rows == nullptr || cols == nullptr) return true;
+    if (data == nullptr || data->kind != Yaml::Kind::list) return &node;
+    if (const Yaml* bad = append_numbers(*data, out)) return bad;
+    if (rows == nullptr || cols == nullptr) return nullptr;
     const auto height = finite_number(*rows);
     const auto width = finite_number(*cols);
-    return height && width && *height * *width == static_cast<double>(out.size());
+    return height && width && *height * *width == static_cast<double>(out.size()) ? nullptr : data;
   }
   const auto value = finite_number(node);
   if (value) out.push_back(*value);
-  return value.has_value();
+  return value ? nullptr : &node;
 }
 
 std::optional<std::vector<double>> CalibrationFields::numbers(std::initializer_list<std::string_view> names,
@@ -141,14 +144,13 @@ std::optional<std::vector<double>> CalibrationFields::numbers(std::initializer_l
   const Yaml* node = find(names);
   if (node == nullptr) return std::nullopt;
   std::vector<double> out;
-  if (node->kind == Yaml::Kind::scalar || !append_numbers(*node, out)) {
-    wrong(*node, joined(names), expected);
-    return std::nullopt;
-  }
-  return out;
+  const Yaml* bad = node->kind == Yaml::Kind::scalar ? node : append_numbers(*node, out);
+  if (bad == nullptr) return out;
+  wrong(*bad, joined(names), expected);
+  return std::nullopt;
 }
 
-std::optional<Pose> CalibrationFields::transform(std::string_view name) {
+std::optional<Pose> CalibrationFields::transform(std::string_view name, bool short_form) {
   constexpr std::string_view kExpected =
       "a rigid transform: 4x4 finite numbers by rows, a rotation matrix and a translation above 0 0 0 1";
   const auto values = numbers({name}, kExpected);
@@ -157,9 +159,10 @@ std::optional<Pose> CalibrationFields::transform(std::string_view name) {
     wrong(*find({name}), name, kExpected);
     return std::nullopt;
   };
-  if (values->size() != 16) return complain();
-  const Eigen::Matrix4d matrix =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values->data());
+  std::vector<double> all = *values;
+  if (short_form && all.size() == 12) all.insert(all.end(), {0, 0, 0, 1});
+  if (all.size() != 16) return complain();
+  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(all.data());
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   constexpr double kTolerance =
       1e-3;  // matrices typed with four digits pass, a scaled or mirrored one does not

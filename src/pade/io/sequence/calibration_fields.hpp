@@ -42,7 +42,8 @@ class CalibrationFields {
   std::optional<std::vector<double>> numbers(std::initializer_list<std::string_view> names,
                                              std::string_view expected);
   /// A rigid transform of 16 numbers (4x4 by rows), checked to be one.
-  std::optional<Pose> transform(std::string_view name);
+  /// @param short_form  also 12, without the last row
+  std::optional<Pose> transform(std::string_view name, bool short_form = false);
 
   /// The key of the file that equals one of `names` but for case, blanks and underscores ("distCoeffs" for
   /// "dist_coeffs"); the first of `names` where there is none.
@@ -67,7 +68,8 @@ class CalibrationFields {
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
  private:
-  bool append_numbers(const Yaml& node, std::vector<double>& out) const;
+  /// @return what is no finite number, or has another size than it states; null if all is good
+  const Yaml* append_numbers(const Yaml& node, std::vector<double>& out) const;
 
   const Yaml& map_;
   std::string file_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include <Eigen/Core>
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
@@ -41,6 +42,23 @@ cv::Size shape_of(std::string_view text) {
   return {columns, rows};
 }
 
+/// Bytes of a number of '<f2', '<f4' or '<f8'; 0 for other types.
+std::size_t float_size(std::string_view type) {
+  for (const std::size_t size : {std::size_t{2}, std::size_t{4}, std::size_t{8}}) {
+    if (type.starts_with(fmt::format("'<f{}'", size))) return size;
+  }
+  return 0;
+}
+
+template <class T>
+void convert(std::string_view bytes, cv::Mat& depth) {
+  T value;
+  for (std::size_t i = 0; i < depth.total(); ++i) {
+    std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
+    depth.ptr<float>()[i] = static_cast<float>(value);
+  }
+}
+
 /// Four channels of a byte are a float; empty where the image is none such.
 cv::Mat float_of_bytes(const std::string& bytes) {
   cv::Mat image;
@@ -61,7 +79,7 @@ cv::Mat float_of_bytes(const std::string& bytes) {
 Result<cv::Mat> parse_npy_depth(std::string_view bytes, const std::string& file) {
   const auto named = [&](const std::string& what) { return Error{fmt::format("{}: {}", file, what)}; };
   constexpr std::string_view kExpected =
-      "expected a .npy array of rows x columns little-endian floats ('<f4', in C order)";
+      "expected a .npy array of rows x columns little-endian floats ('<f2', '<f4' or '<f8', in C order)";
   if (bytes.size() < 12 || !bytes.starts_with("\x93NUMPY")) return named(std::string(kExpected));
   const auto byte = [&](std::size_t i) {
     return static_cast<std::size_t>(static_cast<unsigned char>(bytes[i]));
@@ -74,18 +92,24 @@ Result<cv::Mat> parse_npy_depth(std::string_view bytes, const std::string& file)
   bytes.remove_prefix(length);
   const cv::Size size = shape_of(value_of(header, "'shape'"));
   constexpr int kLongest = 1 << 16;
-  if (!value_of(header, "'descr'").starts_with("'<f4'") ||
-      !value_of(header, "'fortran_order'").starts_with("False") || size.width < 1 || size.height < 1 ||
-      size.width > kLongest || size.height > kLongest) {
+  const std::size_t each = float_size(value_of(header, "'descr'"));
+  if (each == 0 || !value_of(header, "'fortran_order'").starts_with("False") || size.width < 1 ||
+      size.height < 1 || size.width > kLongest || size.height > kLongest) {
     return named(fmt::format("found {}, {}", in_quotes(header), kExpected));
   }
-  const std::size_t needed =
-      sizeof(float) * static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
-  if (bytes.size() < needed) {
-    return named(fmt::format("the .npy is cut short: {} bytes of values, expected {}", bytes.size(), needed));
+  const std::size_t count = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
+  if (bytes.size() < each * count) {
+    return named(
+        fmt::format("the .npy is cut short: {} bytes of values, expected {}", bytes.size(), each * count));
   }
   cv::Mat depth(size, CV_32FC1);
-  std::memcpy(depth.data, bytes.data(), needed);
+  if (each == sizeof(float)) {
+    std::memcpy(depth.data, bytes.data(), each * count);
+  } else if (each == sizeof(double)) {
+    convert<double>(bytes, depth);
+  } else {
+    convert<Eigen::half>(bytes, depth);
+  }
   return depth;
 }
 

@@ -48,14 +48,22 @@ Result<Pose> Trajectory::at(Time time, double largest_gap) const {
   if (after != rows_.begin() && is_now(*std::prev(after))) return std::prev(after)->pose;
   if (rows_.empty()) return Error{"there are no poses"};
   if (after == rows_.begin() || after == rows_.end()) {
-    return Error{fmt::format("time {} lies outside the poses, which cover {} to {}", to_string(time),
-                             to_string(rows_.front().time), to_string(rows_.back().time))};
+    const double apart =
+        std::max(seconds_between(time, rows_.front().time), seconds_between(rows_.back().time, time));
+    constexpr double kAnother = 10;  // s
+    return Error{
+        fmt::format("time {} lies outside the poses, which cover {} to {}{}", to_string(time),
+                    to_string(rows_.front().time), to_string(rows_.back().time),
+                    apart > kAnother ? " (of another flight, or of a clock with another zero?)" : "")};
   }
   const StampedPose& before = *std::prev(after);
   const double gap = seconds_between(before.time, after->time);
   if (gap > largest_gap) {
-    return Error{fmt::format("time {} lies in a gap of {:.3f} s between poses, expected at most {:g} s",
-                             to_string(time), gap, largest_gap)};
+    // Whole numbers that rise by 10 to 1000 are how cameras count milliseconds.
+    const bool whole = gap >= 10 && gap <= 1000 && std::abs(gap - std::round(gap)) < 1e-9;
+    return Error{fmt::format(
+        "time {} lies in a gap of {:.3f} s between poses, expected at most {:g} s{}", to_string(time), gap,
+        largest_gap, whole ? " (stamps in milliseconds? write seconds, or [ms] into a heading)" : "")};
   }
   return interpolate(before.pose, after->pose, seconds_between(before.time, time) / gap);
 }

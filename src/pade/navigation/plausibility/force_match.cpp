@@ -67,6 +67,7 @@ ForceMatch::ForceMatch(const NavigationLog& log, const Reading& reading) {
   zero_ = log.imu.front().time;
   Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();
   Vector3d integral = Vector3d::Zero();
+  const double force = reading.force_turned ? -1 : 1;
   const Vector3d signs = reading.gyroscope_turned ? Vector3d(1, -1, -1) : Vector3d(1, 1, 1);
   for (std::size_t i = 0; i < log.imu.size(); ++i) {
     const double t = seconds_between(zero_, log.imu[i].time);
@@ -77,7 +78,7 @@ ForceMatch::ForceMatch(const NavigationLog& log, const Reading& reading) {
       const Vector3d rate =
           reading.gyroscope_scale * log.imu[i].angular_rate.cwiseProduct(signs) - reading.gyroscope_bias;
       turned = (turned * rotation_exp(Vector3d(rate * step))).normalized();
-      integral += step * (turned * log.imu[i].specific_force);
+      integral += force * step * (turned * log.imu[i].specific_force);
     }
     times_.push_back(t);
     integral_.push_back(integral);

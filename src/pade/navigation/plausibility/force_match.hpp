@@ -18,6 +18,7 @@ struct Reading {
   bool gyroscope_turned = false;  ///< y and z of the angular rate have the other sign
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, after the scale and in its axes
   bool velocity_of_ned = false;                              ///< the velocities are north, east, down
+  bool force_turned = false;                                 ///< all specific forces have the other sign
 };
 
 /// `reading` with the gyroscope bias that fits best, within 0.2 rad/s: over windows of 5 s a bias of 0.08

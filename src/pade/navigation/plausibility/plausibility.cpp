@@ -111,7 +111,11 @@ void check_upright(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) 
                   "fly upside "
                   "down",
                   mean.z()),
-      "where the log is in forward, right, down, write '# frame=FRD' into its first line");
+      "where the log is in forward, right, down, write '# frame=FRD' into its first line; where it counts "
+      "the pull of "
+      "gravity as a positive acceleration downwards, turn the signs of ax ay az round (at rest a level "
+      "sensor measures "
+      "+9.8 upwards)");
 }
 
 /// The mean velocity between two fixes, from the velocities in between.
@@ -258,15 +262,26 @@ double check_readings(const NavigationLog& log, const ForceMatch& given, std::ve
   };
   constexpr double kDegree = 0.017453292519943295;
   const std::array candidates = {
-      Candidate{{kDegree, false, Vector3d::Zero(), false},
+      Candidate{{kDegree, false, Vector3d::Zero(), false, false},
                 "gyro-unit",
                 "when the angular rates are read as deg/s",
                 "convert the angular rates to rad/s, or write the unit into the heading (gx [deg/s])"},
-      Candidate{{1, true, Vector3d::Zero(), false},
+      Candidate{{1, true, Vector3d::Zero(), false, false},
                 "gyro-axes",
                 "when y and z of the angular rates are turned round",
                 "gyroscopes and accelerometers are in different axes (FLU and FRD): convert one of them"},
-      Candidate{{1, false, Vector3d::Zero(), true},
+      Candidate{
+          {-1, false, Vector3d::Zero(), false, true},  // mirrored axes are right-handed with all signs turned
+          "gyro-axes",
+          "when the axes of the IMU are read as left-handed",
+          "two axes of the IMU have changed places, or the sign of one is wrong, in the angular rates and "
+          "the "
+          "forces alike: give x, y, z of a right-handed frame"},
+      Candidate{{-1, false, Vector3d::Zero(), false, false},
+                "gyro-axes",
+                "when all angular rates have the other sign",
+                "turn the signs of the angular rates round: positive is counterclockwise about each axis"},
+      Candidate{{1, false, Vector3d::Zero(), true, false},
                 "gnss-axes",
                 "when the GNSS velocities are read as north, east, down",
                 "write '# frame=NED' into the first line of the GNSS log, or name its columns vN vE vD"}};

@@ -14,6 +14,7 @@
 #include "pade/io/formats/flow_file.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
+#include "pade/simulation/flight/frame_maker.hpp"
 #include "pade/simulation/flight/sensor_files.hpp"
 #include "pade/simulation/render/truth.hpp"
 #include "pade/simulation/world/world_fingerprint.hpp"
@@ -187,8 +188,9 @@ class Recorder {
         options_(options),
         stations_(std::move(stations)),
         work_(std::move(work)),
-        grid_(camera.camera),
-        renderer_(scene) {}
+        maker_(scene, camera.camera,
+               {flight.image, options.render, flight.exposure_time, flight.blur_samples, options.seed,
+                options.threads}) {}
 
   Status record(const FrameProgress& progress) const;
 
@@ -204,8 +206,7 @@ class Recorder {
   const SequenceOptions& options_;
   std::vector<CameraStation> stations_;
   fs::path work_;
-  RayGrid grid_;
-  Renderer renderer_;
+  FrameMaker maker_;
 };
 
 Status Recorder::record(const FrameProgress& progress) const {
@@ -224,22 +225,9 @@ Status Recorder::record(const FrameProgress& progress) const {
 
 Rendering Recorder::exposed(std::size_t index) const {
   const CameraStation& station = stations_[index];
-  if (flight_.exposure_time <= 0)
-    return renderer_.render(grid_, station.T_world_camera, options_.render, options_.threads);
-  Rendering blurred;
-  blurred.depth = exact_depth(scene_, grid_, station.T_world_camera, options_.threads);
-  for (int k = 0; k < flight_.blur_samples; ++k) {
-    const double offset = flight_.exposure_time * ((k + 0.5) / flight_.blur_samples - 0.5);
-    const Pose pose = camera_pose_at(path_, station.time.seconds() + offset, camera_.T_body_camera);
-    const Rendering part = renderer_.render(grid_, pose, options_.render, options_.threads);
-    if (k == 0) {
-      blurred.radiance = part.radiance;
-    } else {
-      blurred.radiance += part.radiance;
-    }
-  }
-  blurred.radiance /= flight_.blur_samples;
-  return blurred;
+  return maker_.expose(station.T_world_camera, [&](double offset) {
+    return camera_pose_at(path_, station.time.seconds() + offset, camera_.T_body_camera);
+  });
 }
 
 Status Recorder::frame(std::size_t index) const {
@@ -252,10 +240,7 @@ Status Recorder::frame(std::size_t index) const {
   if (options_.save_flow) {
     if (const Status s = flow(index, rendering.depth); !s) return s;
   }
-  // The stamp, not the index, seeds the noise: leaving frames out does not change the others.
-  const cv::Mat image =
-      form_image(rendering.radiance, grid_, flight_.image, station.time.seconds(), options_.seed,
-                 static_cast<std::uint64_t>(station.time.nanoseconds), options_.threads);
+  const cv::Mat image = maker_.picture(rendering, station.time);
   const Result<std::string> encoded = png_bytes(work_ / "rgb" / name, image);
   if (const Status s = depth_written.get(); !s) return s;
   if (!encoded) return encoded.error();
@@ -264,7 +249,7 @@ Status Recorder::frame(std::size_t index) const {
 
 Status Recorder::flow(std::size_t index, const cv::Mat& depth) const {
   const auto toward = [&](std::size_t other, const std::string& which) -> Status {
-    const ExactFlow exact = exact_flow(scene_, grid_, depth, stations_[index].T_world_camera,
+    const ExactFlow exact = exact_flow(scene_, maker_.grid(), depth, stations_[index].T_world_camera,
                                        stations_[other].T_world_camera, options_.threads);
     const std::string name = to_string(stations_[index].time);
     if (const Status s = io::write_flow(work_ / fmt::format("flow_{}/{}.flo", which, name), exact.flow); !s)

@@ -6,32 +6,23 @@
 
 #include <fmt/format.h>
 
-#include "pade/core/random.hpp"
 #include "pade/io/atomic_output.hpp"
-#include "pade/simulation/generator/mesh_generator.hpp"
+#include "pade/simulation/generator/furniture.hpp"
 
 namespace pade::simulation {
 namespace {
 
 using Eigen::Vector3d;
 constexpr double kPi = std::numbers::pi;
-constexpr int kTrees = 3;  // different meshes
-constexpr int kStones = 3;
 
-// What reflects in a pane, wear on paint, and rust: nothing outdoors is of one tone.
-const Finish kGlass{"plaster", {0.30, 0.34, 0.38}, 0.8, 2.5};
-const Finish kMetal{"concrete", {0.62, 0.63, 0.65}, 0.25, 1.5};
-const Finish kRust{"concrete", {0.52, 0.36, 0.27}, 0.2, 1.5};
-const Finish kDark{"asphalt", {0.6, 0.6, 0.62}, 0.3};
-const Finish kWire{"", {0.12, 0.11, 0.1}};
-
-/// What the worlds have in common: a seeded stream, a builder, and furniture.
-class Generator {
+/// The five kinds.
+class Generator : Furniture {
  public:
   Generator(std::string_view name, std::uint64_t seed)
-      : random_(seed * 1000003 + 17),
-        out_(name, fmt::format("Made by: pade simulate --random {} --seed {} --write-world {}.sdf", name,
-                               seed, name)) {}
+      : Furniture(name,
+                  fmt::format("Made by: pade simulate --random {} --seed {} --write-world {}.sdf", name, seed,
+                              name),
+                  seed * 1000003 + 17) {}
 
   WorldFiles building();
   WorldFiles street();
@@ -40,131 +31,18 @@ class Generator {
   WorldFiles corridor();
 
  private:
-  void add_tree_meshes(const TreeShape& shape);
-  void add_stone_meshes();
-  void tree(const Vector3d& foot, double scale);
-  void lamp(const Vector3d& foot, double height, double toward_y);
-  void car(const Vector3d& at, double yaw);
-  /// Windows on a wall whose outside looks along -x (side = -1) or along +-y; rows and columns fill the
-  /// rectangle.
-  void windows_facing_x(double wall_x, double y0, double y1, double z0, double z1, double side);
-  void windows_facing_y(double wall_y, double x0, double x1, double z0, double z1, double side);
   void scaffold();
   void lift_shaft();
   void hedges();
-  void house(double x0, double x1, double front_y, double depth, double height);
-  Vector3d tint(double low, double high) {
-    const double base = random_.uniform(low, high);
-    return {base * random_.uniform(0.94, 1.0), base * random_.uniform(0.92, 1.0),
-            base * random_.uniform(0.86, 1.0)};
-  }
-
-  Random random_;
-  SdfBuilder out_;
 };
-
-void Generator::add_tree_meshes(const TreeShape& shape) {
-  for (int i = 0; i < kTrees; ++i) {
-    const TreeMeshes tree = grow_tree(shape, random_);
-    out_.add_mesh_file(fmt::format("tree{}_wood.obj", i), tree.wood);
-    out_.add_mesh_file(fmt::format("tree{}_leaves.obj", i), tree.leaves);
-  }
-}
-
-void Generator::add_stone_meshes() {
-  for (int i = 0; i < kStones; ++i) out_.add_mesh_file(fmt::format("stone{}.obj", i), break_stone(random_));
-}
-
-void Generator::tree(const Vector3d& foot, double scale) {
-  const int kind = static_cast<int>(kTrees * random_.uniform());
-  const double yaw = random_.uniform(0, 2 * kPi);
-  const Vector3d size =
-      scale * Vector3d(random_.uniform(0.9, 1.15), random_.uniform(0.9, 1.15), random_.uniform(0.9, 1.2));
-  out_.model("tree");
-  out_.mesh(fmt::format("tree{}_wood.obj", kind), foot, yaw, size, {"bark", tint(0.8, 1.0), 0.6});
-  out_.mesh(fmt::format("tree{}_leaves.obj", kind), foot, yaw, size, {"leaves", tint(0.8, 1.0)});
-}
-
-void Generator::lamp(const Vector3d& foot, double height, double toward_y) {
-  out_.model("lamp");
-  out_.rod(foot, foot + Vector3d(0, 0, height), 0.06, kMetal);
-  out_.rod(foot + Vector3d(0, 0, height), foot + Vector3d(0, toward_y, height + 0.15), 0.035, kMetal);
-  out_.box(foot + Vector3d(0, toward_y, height + 0.12), {0.2, 0.5, 0.1}, {"plaster", {0.9, 0.9, 0.87}, 0.3});
-  out_.cylinder(foot + Vector3d(0, 0, 0.3), 0.11, 0.6, {"concrete"});
-}
-
-void Generator::car(const Vector3d& at, double yaw) {
-  const Finish paint{"concrete", tint(0.5, 1.0), 0.5, 1.2};
-  const auto place = [&](double x, double y, double z) -> Vector3d {
-    return at + Vector3d(std::cos(yaw) * x - std::sin(yaw) * y, std::sin(yaw) * x + std::cos(yaw) * y, z);
-  };
-  out_.model("car");
-  out_.box(place(0, 0, 0.55), {4.2, 1.75, 0.6}, paint, {0, 0, yaw});
-  out_.box(place(-0.2, 0, 1.1), {2.2, 1.55, 0.55}, kGlass, {0, 0, yaw});
-  out_.box(place(-0.2, 0, 1.42), {2.0, 1.5, 0.1}, paint, {0, 0, yaw});
-  out_.box(place(2.11, 0.6, 0.62), {0.05, 0.3, 0.15}, {"", {0.9, 0.9, 0.85}}, {0, 0, yaw});
-  out_.box(place(2.11, -0.6, 0.62), {0.05, 0.3, 0.15}, {"", {0.9, 0.9, 0.85}}, {0, 0, yaw});
-  for (const double x : {-1.3, 1.3}) {
-    for (const double y : {-0.8, 0.8}) out_.cylinder(place(x, y, 0.33), 0.33, 0.22, kDark, {kPi / 2, 0, yaw});
-  }
-}
-
-void Generator::windows_facing_x(double wall_x, double y0, double y1, double z0, double z1, double side) {
-  const int columns = std::max(1, static_cast<int>((y1 - y0) / 2.6));
-  const int rows = std::max(1, static_cast<int>((z1 - z0) / 2.9));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const Vector3d centre(wall_x, y0 + (column + 0.5) * (y1 - y0) / columns,
-                            z0 + (row + 0.55) * (z1 - z0) / rows);
-      out_.box(centre + side * Vector3d(0.01, 0, 0), {0.04, 1.2, 1.5}, kGlass);
-      out_.box(centre + Vector3d(side * 0.06, 0, -0.82), {0.22, 1.5, 0.1}, {"concrete", tint(0.8, 1.0)});
-      out_.box(centre + Vector3d(side * 0.03, 0, 0), {0.06, 0.07, 1.5}, {"plaster", {0.95, 0.95, 0.92}, 0.3});
-      out_.box(centre + Vector3d(side * 0.04, 0, 0.78), {0.1, 1.36, 0.08},
-               {"plaster", {0.95, 0.95, 0.92}, 0.3});
-      if (random_.uniform() < 0.3)
-        out_.box(centre + Vector3d(side * 0.04, 0.95, 0), {0.05, 0.6, 1.5}, {"bark", tint(0.7, 1.0), 0.5});
-    }
-  }
-}
-
-void Generator::windows_facing_y(double wall_y, double x0, double x1, double z0, double z1, double side) {
-  const int columns = std::max(1, static_cast<int>((x1 - x0) / 2.6));
-  const int rows = std::max(1, static_cast<int>((z1 - z0) / 2.9));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const Vector3d centre(x0 + (column + 0.5) * (x1 - x0) / columns, wall_y,
-                            z0 + (row + 0.55) * (z1 - z0) / rows);
-      out_.box(centre + side * Vector3d(0, 0.01, 0), {1.2, 0.04, 1.5}, kGlass);
-      out_.box(centre + Vector3d(0, side * 0.06, -0.82), {1.5, 0.22, 0.1}, {"concrete", tint(0.8, 1.0)});
-      out_.box(centre + Vector3d(0, side * 0.03, 0), {0.07, 0.06, 1.5}, {"plaster", {0.95, 0.95, 0.92}, 0.3});
-      if (random_.uniform() < 0.25)
-        out_.box(centre + Vector3d(0, side * 0.35, -0.95), {1.6, 0.7, 0.12}, {"concrete"});
-    }
-  }
-}
-
-/// A house whose front looks toward the street (y = 0).
-void Generator::house(double x0, double x1, double front_y, double depth, double height) {
-  const double side = front_y > 0 ? -1 : 1;  // the way out of the front
-  const char* const patterns[] = {"brick", "plaster", "plaster", "concrete", "brick"};
-  const std::string_view pattern = patterns[static_cast<int>(5 * random_.uniform())];
-  out_.model("house");
-  out_.box({0.5 * (x0 + x1), front_y - side * 0.5 * depth, 0.5 * height}, {x1 - x0, depth, height},
-           {pattern, tint(0.75, 1.0)});
-  out_.box({0.5 * (x0 + x1), front_y - side * 0.5 * depth, height + 0.15}, {x1 - x0 + 0.5, depth + 0.5, 0.3},
-           {"concrete", tint(0.5, 0.8)});
-  out_.box({0.5 * (x0 + x1), front_y + side * 0.05, 0.4}, {x1 - x0, 0.12, 0.8}, {"concrete", tint(0.6, 0.8)});
-  windows_facing_y(front_y, x0 + 0.5, x1 - 0.5, 1.0, height - 0.4, side);
-  out_.box({x0 + 1.6, front_y + side * 0.08, 1.05}, {1.1, 0.12, 2.1}, {"bark", tint(0.6, 0.9), 1.5});
-}
 
 /// Before the tower: two poles, ledgers and boards.
 void Generator::scaffold() {
   constexpr double kX = 24.4;
-  for (const double y : {17.4, 20.4}) out_.rod({kX, y, 0}, {kX, y, 26}, 0.05, kRust);
+  for (const double y : {17.4, 20.4}) out_.rod({kX, y, 0}, {kX, y, 26}, 0.05, finish::rust);
   for (int i = 1; i <= 8; ++i) {
     const double z = 3.0 * i - 1.1;
-    out_.rod({kX, 17.4, z}, {kX, 20.4, z + 0.4 * (i % 2)}, 0.035, kRust);
+    out_.rod({kX, 17.4, z}, {kX, 20.4, z + 0.4 * (i % 2)}, 0.035, finish::rust);
     if (random_.uniform() < 0.6)
       out_.box({kX + 0.5, 18.9, z - 0.1}, {0.9, 3.4, 0.06}, {"bark", tint(0.8, 1.0)});
   }
@@ -175,7 +53,7 @@ void Generator::lift_shaft() {
   out_.box({25.6, 22.6, 14}, {2.8, 2.4, 28}, {"brick", tint(0.85, 1.0), random_.uniform(0.8, 1.1)});
   for (int floor = 1; floor < 9; ++floor) {
     out_.box({25.6, 22.6, 3.1 * floor}, {2.9, 2.5, 0.25}, {"concrete", tint(0.7, 0.95), 0.6});
-    if (random_.uniform() < 0.7) out_.box({24.19, 22.3, 3.1 * floor + 1.4}, {0.1, 0.9, 0.9}, kGlass);
+    if (random_.uniform() < 0.7) out_.box({24.19, 22.3, 3.1 * floor + 1.4}, {0.1, 0.9, 0.9}, finish::glass);
   }
 }
 
@@ -215,8 +93,8 @@ WorldFiles Generator::building() {
     out_.box({26.2, y, 3.1 * floor}, {1.6, 3.2, 0.16}, {"concrete"});
     for (int i = 0; i <= 8; ++i)
       out_.rod({25.45, y - 1.55 + 0.387 * i, 3.1 * floor}, {25.45, y - 1.55 + 0.387 * i, 3.1 * floor + 1},
-               0.018, kMetal);
-    out_.rod({25.45, y - 1.55, 3.1 * floor + 1}, {25.45, y + 1.55, 3.1 * floor + 1}, 0.03, kMetal);
+               0.018, finish::metal);
+    out_.rod({25.45, y - 1.55, 3.1 * floor + 1}, {25.45, y + 1.55, 3.1 * floor + 1}, 0.03, finish::metal);
   }
   scaffold();
   lift_shaft();
@@ -282,10 +160,10 @@ WorldFiles Generator::street() {
   out_.model("wires");
   for (double at = -10; at < 70; at += random_.uniform(6, 11))
     out_.rod({at, -7.2, random_.uniform(4.6, 5.4)},
-             {at + random_.uniform(-1, 1), 7.2, random_.uniform(4.6, 5.4)}, 0.02, kWire);
+             {at + random_.uniform(-1, 1), 7.2, random_.uniform(4.6, 5.4)}, 0.02, finish::wire);
   for (double at = 2; at < 64; at += random_.uniform(7, 10)) {  // signs beside the lane
     const double side = random_.uniform() < 0.5 ? -1 : 1;
-    out_.rod({at, side * 1.75, 0}, {at, side * 1.75, 2.5}, 0.03, kMetal);
+    out_.rod({at, side * 1.75, 0}, {at, side * 1.75, 2.5}, 0.03, finish::metal);
     out_.box({at, side * 1.75, 2.2}, {0.03, 0.5, 0.5}, {"concrete", tint(0.8, 1.0), 0.3, 2}, {kPi / 4, 0, 0});
   }
   house(84, 110, 30, 60, 11);
@@ -359,7 +237,7 @@ WorldFiles Generator::rubble() {
         out_.rod(
             top,
             top + Vector3d(random_.uniform(-0.4, 0.4), random_.uniform(-0.4, 0.4), random_.uniform(0.4, 1.3)),
-            0.012, kRust);
+            0.012, finish::rust);
       }
     }
     for (double at = -8; at < 58; at += random_.uniform(4, 7)) {
@@ -376,11 +254,11 @@ WorldFiles Generator::rubble() {
     const bool bare = random_.uniform() < 0.5;
     out_.rod({at, y, 0},
              {at + random_.uniform(-0.2, 0.2), y + side * random_.uniform(0, 0.5), random_.uniform(1.8, 4)},
-             bare ? 0.015 : 0.045, bare ? kRust : kMetal);
+             bare ? 0.015 : 0.045, bare ? finish::rust : finish::metal);
   }
   for (double at = -4; at < 60; at += random_.uniform(3, 6))
     out_.rod({at, -6.3, random_.uniform(2.6, 4.6)},
-             {at + random_.uniform(-2, 2), 6.3, random_.uniform(2.6, 4.6)}, 0.008, kWire);
+             {at + random_.uniform(-2, 2), 6.3, random_.uniform(2.6, 4.6)}, 0.008, finish::wire);
   for (double at = 3; at < 60; at += random_.uniform(7, 10))
     slab({at, random_.uniform(-0.6, 0.6), random_.uniform(3.3, 4.2)}, {0.4, 13, 0.45},
          {random_.uniform(-0.12, 0.12), 0, random_.uniform(-0.2, 0.2)}, false);
@@ -440,14 +318,14 @@ WorldFiles Generator::corridor() {
       out_.cylinder({at + 2.3, -side * (kHalfWidth - 0.22), 0.45}, 0.2, 0.9,
                     {"concrete", tint(0.5, 0.95), 0.5, 1.4});
     if (random_.uniform() < 0.6)
-      out_.rod({at + 0.8, side * 1.2, 0}, {at + 0.8, side * 1.25, kHeight}, 0.03, kMetal);
+      out_.rod({at + 0.8, side * 1.2, 0}, {at + 0.8, side * 1.25, kHeight}, 0.03, finish::metal);
   }
   for (const double y : {1.85, 1.65})
-    out_.rod({kFrom, y, kHeight - 0.2}, {kTo, y, kHeight - 0.2}, 0.06, kMetal);
-  out_.rod({kFrom, -1.9, kHeight - 0.15}, {kTo, -1.9, kHeight - 0.15}, 0.02, kWire);
+    out_.rod({kFrom, y, kHeight - 0.2}, {kTo, y, kHeight - 0.2}, 0.06, finish::metal);
+  out_.rod({kFrom, -1.9, kHeight - 0.15}, {kTo, -1.9, kHeight - 0.15}, 0.02, finish::wire);
   for (double at = kFrom + 2; at < kTo; at += 4) {
     out_.box({at, 0, kHeight - 0.25}, {1.2, 0.2, 0.08}, {"", {0.95, 0.95, 0.9}});
-    out_.rod({at, 0, kHeight}, {at, 0, kHeight - 0.22}, 0.01, kWire);
+    out_.rod({at, 0, kHeight}, {at, 0, kHeight - 0.22}, 0.01, finish::wire);
   }
   out_.model("outside");
   out_.ground({kMiddle, 0, -0.3}, {200, 200}, {"grass"});

@@ -1,6 +1,7 @@
 #include "pade/simulation/sdf/sdf_files.hpp"
 
 #include <algorithm>
+#include <array>
 #include <regex>
 
 #include <fmt/format.h>
@@ -50,19 +51,71 @@ std::optional<std::pair<std::string, std::size_t>> element(const std::string& te
   return std::nullopt;
 }
 
-Status check_version(const fs::path& file, const std::string& text) {
+Status check_version(const fs::path& file, const std::string& text, bool may_be_later) {
   static const std::regex version_attribute(R"re(<sdf\s[^>]*version\s*=\s*["']([^"']*)["'])re");
   std::smatch found;
   if (!std::regex_search(text, found, version_attribute)) {
+    if (text.find("<robot") != std::string::npos) {
+      return Error{
+          fmt::format("{}: found URDF (<robot>), expected SDF: convert it (gz sdf -p FILE.urdf > FILE.sdf)",
+                      file.string())};
+    }
     return Error{fmt::format("{}: found no <sdf version=\"...\">, expected an SDF file", file.string())};
   }
   static const std::regex known(R"(1\.[0-9])");
-  if (!std::regex_match(found[1].str(), known)) {
+  static const std::regex later(R"(1\.1[0-9])");
+  const std::string version = found[1].str();
+  if (!std::regex_match(version, known) && !(may_be_later && std::regex_match(version, later))) {
     return Error{fmt::format(
         "{}:{}: found SDF version {}, expected 1.0 to 1.9 (write version=\"1.9\" if nothing newer is used)",
-        file.string(), line_at(text, static_cast<std::size_t>(found.position(1))), found[1].str())};
+        file.string(), line_at(text, static_cast<std::size_t>(found.position(1))), version)};
   }
   return {};
+}
+
+/// What nobody sees, with all that is inside it.
+constexpr std::array<std::string_view, 24> kUnseen = {"physics",
+                                                      "gravity",
+                                                      "magnetic_field",
+                                                      "atmosphere",
+                                                      "wind",
+                                                      "gui",
+                                                      "audio",
+                                                      "plugin",
+                                                      "inertial",
+                                                      "collision",
+                                                      "actor",
+                                                      "population",
+                                                      "road",
+                                                      "static",
+                                                      "kinematic",
+                                                      "self_collide",
+                                                      "enable_wind",
+                                                      "gripper",
+                                                      "velocity_decay",
+                                                      "laser_retro",
+                                                      "visibility_flags",
+                                                      "allow_auto_disable",
+                                                      "spherical_coordinates",
+                                                      "fog"};
+
+/// The end of the element whose tag begins at `open`, behind its closing tag; npos where it is not closed.
+std::size_t end_of_element(const std::string& text, const std::string& tag, std::size_t open) {
+  int depth = 0;
+  for (std::size_t at = open; at != std::string::npos; at = text.find('<', at + 1)) {
+    const std::size_t close = text.find('>', at);
+    if (close == std::string::npos) return std::string::npos;
+    const std::string_view inside = std::string_view(text).substr(at + 1, close - at - 1);
+    const bool closes = inside.starts_with("/" + tag);
+    const std::string_view rest = inside.substr(std::min(inside.size(), tag.size() + (closes ? 1 : 0)));
+    const bool same =
+        (closes || inside.starts_with(tag)) && (rest.empty() || rest.find_first_of(" \t\r\n/") == 0);
+    if (!same) continue;
+    if (closes) --depth;
+    if (!closes && !inside.ends_with('/')) ++depth;
+    if (depth <= 0) return close + 1;
+  }
+  return std::string::npos;
 }
 
 Status check(const fs::path& file, const ResourcePaths& resources, std::vector<fs::path>& open) {
@@ -76,7 +129,7 @@ Status check(const fs::path& file, const ResourcePaths& resources, std::vector<f
   const auto content = io::read_file(file);
   if (!content) return content.error();
   const std::string text = without_comments(*content);
-  if (const Status version = check_version(file, text); !version) return version.error();
+  if (const Status version = check_version(file, text, open.empty()); !version) return version.error();
   open.push_back(self);
   std::size_t from = 0;
   while (const auto include = element(text, "include", from)) {
@@ -86,8 +139,13 @@ Status check(const fs::path& file, const ResourcePaths& resources, std::vector<f
     const auto found = resolve_uri(name, file.parent_path(), resources);
     const auto model = found ? model_file(*found) : std::nullopt;
     if (!model) {
-      return Error{fmt::format("{}:{}: found an include of '{}', which is in none of the resource folders",
-                               file.string(), line_at(text, from), name)};
+      const bool remote = name.starts_with("http://") || name.starts_with("https://");
+      return Error{fmt::format(
+          "{}:{}: found an include of '{}', {}", file.string(), line_at(text, from), name,
+          remote ? "which is on a server: download it (gz fuel download -u URL) and write "
+                   "model://NAME, with the folder above it by --resource-path"
+                 : "which is in none of the resource folders (--resource-path, models/ beside the "
+                   "world, GZ_SIM_RESOURCE_PATH)")};
     }
     if (const Status status = check(*model, resources, open); !status) return status.error();
   }
@@ -136,6 +194,35 @@ std::optional<fs::path> model_file(const fs::path& path) {
   }
   if (fs::is_regular_file(path / "model.sdf", ignored)) return path / "model.sdf";
   return std::nullopt;
+}
+
+std::string without_unseen(std::string text) {
+  text = without_comments(std::move(text));
+  for (const std::string_view name : kUnseen) {
+    const std::string tag(name);
+    std::size_t open = text.find("<" + tag);
+    while (open != std::string::npos) {
+      const std::size_t after = open + 1 + tag.size();
+      const bool whole =
+          after < text.size() && std::string_view(" \t\r\n/>").find(text[after]) != std::string::npos;
+      const std::size_t end = whole ? end_of_element(text, tag, open) : std::string::npos;
+      for (std::size_t i = open; end != std::string::npos && i < end; ++i) {
+        if (text[i] != '\n') text[i] = ' ';
+      }
+      open = text.find("<" + tag, open + 1);
+    }
+  }
+  if (const std::string later = later_version(text); !later.empty()) {
+    const std::size_t at = text.find(later, text.find("<sdf"));
+    text.replace(at, later.size(), "1.9");
+  }
+  return text;
+}
+
+std::string later_version(const std::string& text) {
+  static const std::regex later(R"re(<sdf\s[^>]*version\s*=\s*["'](1\.1[0-9])["'])re");
+  std::smatch found;
+  return std::regex_search(text, found, later) ? found[1].str() : std::string();
 }
 
 Status check_sdf_files(const fs::path& file, const ResourcePaths& resources) {

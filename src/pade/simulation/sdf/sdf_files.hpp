@@ -23,8 +23,16 @@ std::optional<std::filesystem::path> resolve_uri(const std::string& uri, const s
 /// The SDF file of a model folder (by model.config, else model.sdf), or the path itself if it is a file.
 std::optional<std::filesystem::path> model_file(const std::filesystem::path& path);
 
-/// Checks a file and all that it includes: it can be read, its version is 1.0 to 1.9, included files exist,
-/// and none includes itself.
+/// Checks a file and all that it includes: it can be read, its version is 1.0 to 1.9 (of the file itself also
+/// a later 1.x), included files exist, and none includes itself.
 Status check_sdf_files(const std::filesystem::path& file, const ResourcePaths& resources);
+
+/// A file in words that libsdformat 12 takes, with the same lines: a later version as 1.9, and without what
+/// cannot be seen (physics, collisions, plugins, user interfaces ...), which may be wrong in ways that do not
+/// matter here.
+std::string without_unseen(std::string text);
+
+/// The version that a file states, if it is later than 1.9; else empty.
+std::string later_version(const std::string& text);
 
 }  // namespace pade::simulation

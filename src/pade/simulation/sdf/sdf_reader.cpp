@@ -40,7 +40,14 @@ Eigen::Vector3d linear_colour(const ignition::math::Color& c) {
 Error error_of(const sdf::Error& error, const fs::path& file) {
   const std::string where = error.FilePath() ? *error.FilePath() : file.string();
   const std::string line = error.LineNumber() ? fmt::format(":{}", *error.LineNumber()) : "";
-  return {fmt::format("{}{}: {}", where, line, error.Message())};
+  // libsdformat says of a colour no more than that it is invalid.
+  static const std::set<std::string> kColours = {"<diffuse>", "<ambient>", "<emissive>", "<specular>",
+                                                 "<background>"};
+  const bool colour = std::any_of(kColours.begin(), kColours.end(), [&](const std::string& name) {
+    return error.Message().find(name) != std::string::npos;
+  });
+  return {fmt::format("{}{}: {}{}", where, line, error.Message(),
+                      colour ? "; expected red, green, blue and opacity from 0 to 1" : "")};
 }
 
 /// Keeps what libsdformat prints, since some of its errors are only printed.
@@ -119,6 +126,34 @@ Pose resolved(const sdf::SemanticPose& semantic, const ignition::math::Pose3d& r
   return pose_of(pose);
 }
 
+/// What libsdformat made of a file.
+struct Attempt {
+  sdf::SDFPtr document = std::make_shared<sdf::SDF>();
+  std::optional<Error> error;
+};
+
+/// @param text  read in place of the file
+Attempt attempt(const fs::path& file, const std::optional<std::string>& text,
+                const sdf::ParserConfig& config) {
+  Attempt out;
+  sdf::init(out.document);
+  const ConsoleCapture console;
+  sdf::Errors errors;
+  const bool read = text ? sdf::readString(*text, config, out.document, errors)
+                         : sdf::readFile(file.string(), config, out.document, errors);
+  const auto printed = printed_error(console.text());
+  if (!errors.empty()) {
+    // The returned error has the line, the printed one what was found there.
+    out.error = error_of(errors.front(), file);
+    if (printed) out.error->message += fmt::format(" ({})", *printed);
+  } else if (printed) {
+    out.error = Error{fmt::format("{}: {}", file.string(), *printed)};
+  } else if (!read) {
+    out.error = Error{fmt::format("{}: found no SDF document", file.string())};
+  }
+  return out;
+}
+
 /// Reads the document, mends what libsdformat would refuse although it cannot be seen.
 Result<sdf::SDFPtr> Reader::parse() {
   sdf::ParserConfig config;
@@ -133,21 +168,20 @@ Result<sdf::SDFPtr> Reader::parse() {
   };
   config.SetFindCallback(find);
   const FindCallback global(find);
-  auto document = std::make_shared<sdf::SDF>();
-  sdf::init(document);
-  const ConsoleCapture console;
-  sdf::Errors errors;
-  const bool read = sdf::readFile(file_.string(), config, document, errors);
-  const std::string printed = console.text();
-  if (!errors.empty()) {
-    // The returned error has the line, the printed one what was found there.
-    Error error = error_of(errors.front(), file_);
-    if (const auto detail = printed_error(printed)) error.message += fmt::format(" ({})", *detail);
-    return error;
+  const auto text = io::read_file(file_);
+  if (!text) return text.error();
+  const std::string later = later_version(*text);
+  if (!later.empty()) {
+    world_.warnings.push_back(fmt::format(
+        "{}: SDF version {} is read as 1.9, which does not know what is newer", file_.string(), later));
   }
-  if (const auto error = printed_error(printed)) return Error{fmt::format("{}: {}", file_.string(), *error)};
-  if (!read) return Error{fmt::format("{}: found no SDF document", file_.string())};
-  return document;
+  const Attempt first =
+      attempt(file_, later.empty() ? std::nullopt : std::optional(without_unseen(*text)), config);
+  if (!first.error) return first.document;
+  const Attempt again = attempt(file_, without_unseen(*text), config);
+  if (again.error) return *again.error;  // what is seen is wrong, too
+  world_.warnings.push_back(first.error->message + ": left out, since nobody sees it");
+  return again.document;
 }
 
 Result<World> Reader::read() {
@@ -156,7 +190,8 @@ Result<World> Reader::read() {
   if (!document) return document.error();
   const sdf::ElementPtr element = (*document)->Root();
   if (const Status s = check_numbers(element, file_.string()); !s) return s.error();
-  world_.warnings = unsupported_elements(element, file_.string());
+  for (std::string& unsupported : unsupported_elements(element, file_.string()))
+    world_.warnings.push_back(std::move(unsupported));
   for (std::string& repaired : repair_sdf(element, file_.string()))
     world_.warnings.push_back(std::move(repaired));
   sdf::Root root;
@@ -166,6 +201,10 @@ Result<World> Reader::read() {
       if (!is_harmless(error)) return error_of(error, file_);
       world_.warnings.push_back(error_of(error, file_).message);
     }
+  }
+  if (root.WorldCount() > 1) {
+    world_.warnings.push_back(fmt::format("{}: found {} worlds: the first, '{}', is read", file_.string(),
+                                          root.WorldCount(), root.WorldByIndex(0)->Name()));
   }
   if (root.WorldCount() > 0) {
     if (element->HasElement("world")) state_ = read_state(element->GetElement("world"), file_.string());

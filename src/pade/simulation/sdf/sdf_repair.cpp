@@ -52,7 +52,8 @@ class Repair {
     for (const sdf::ElementPtr& child : children_of(element)) {
       const std::string& kind = child->GetName();
       // Frames may hang on joints, so that these stay where they can.
-      if (kind == "collision" || kind == "inertial" || kind == "plugin") {
+      if (kind == "collision" || kind == "inertial" || kind == "plugin" || kind == "actor" ||
+          is_unknown(child)) {
         element->RemoveChild(child);
         continue;
       }
@@ -65,8 +66,58 @@ class Repair {
   std::vector<std::string> warnings;
 
  private:
+  /// Warns of a sensor, light or joint of a type that is none.
+  bool is_unknown(const sdf::ElementPtr& element) {
+    static const std::map<std::string, std::set<std::string>> kTypes = {
+        {"sensor",
+         {"none",
+          "altimeter",
+          "camera",
+          "contact",
+          "depth",
+          "depth_camera",
+          "force_torque",
+          "gps",
+          "navsat",
+          "gpu_lidar",
+          "gpu_ray",
+          "imu",
+          "lidar",
+          "ray",
+          "logical_camera",
+          "magnetometer",
+          "air_pressure",
+          "multicamera",
+          "rfid",
+          "rfidtag",
+          "rgbd",
+          "rgbd_camera",
+          "sonar",
+          "thermal",
+          "thermal_camera",
+          "triggered_camera",
+          "segmentation",
+          "segmentation_camera",
+          "wide_angle_camera",
+          "wireless_receiver",
+          "wireless_transmitter",
+          "custom"}},
+        {"light", {"point", "directional", "spot"}},
+        {"joint",
+         {"ball", "continuous", "fixed", "gearbox", "prismatic", "revolute", "revolute2", "screw",
+          "universal"}}};
+    const auto known = kTypes.find(element->GetName());
+    if (known == kTypes.end() || !element->HasAttribute("type")) return false;
+    const auto type = element->Get<std::string>("type");
+    if (known->second.contains(type)) return false;
+    warnings.push_back(fmt::format("{}: {} of type '{}', which is not known, is left out",
+                                   place_of(element, file_), element->GetName(), type));
+    return true;
+  }
+
   /// The name of a material is enough; the parser puts "__default__" where a file says nothing.
   static void give_uri(const sdf::ElementPtr& script) {
+    if (!script->HasElementDescription("uri")) return;  // of an actor
     const auto uri = script->GetElement("uri");
     const auto text = uri->Get<std::string>();
     if (text.empty() || text == "__default__") {

@@ -158,7 +158,8 @@ void walk(const sdf::ElementPtr& element, const std::string& file, std::map<std:
     if (!shown().contains(name)) {
       Note& note = notes[fmt::format("<{}> in <{}>", name, element->GetName())];
       if (note.count++ == 0) {
-        note.where = fmt::format("{}:{}", child->FilePath().empty() ? file : child->FilePath(),
+        const std::string& own = child->FilePath();
+        note.where = fmt::format("{}:{}", own.empty() || own.front() == '<' ? file : own,
                                  child->LineNumber().value_or(element->LineNumber().value_or(0)));
       }
       continue;  // what is inside goes with it
@@ -192,7 +193,7 @@ std::string place_of(const sdf::ElementPtr& element, const std::string& file) {
 Status check_numbers(const sdf::ElementPtr& root, const std::string& file) {
   static const std::array<std::string_view, 9> numeric = {
       "double", "float", "int", "unsigned int", "vector3", "vector2d", "vector2i", "pose", "color"};
-  if (!root) return {};
+  if (!root || (without_picture().contains(root->GetName()) && root->GetName() != "state")) return {};
   const sdf::ParamPtr value = root->GetValue();
   if (value && std::find(numeric.begin(), numeric.end(), value->GetTypeName()) != numeric.end()) {
     std::istringstream words(value->GetAsString());
@@ -214,7 +215,7 @@ std::optional<std::string> printed_error(const std::string& printed) {
   std::istringstream lines(std::regex_replace(printed, colours, ""));
   for (std::string line; std::getline(lines, line);) {
     const auto begin = line.find("Error");
-    if (begin == std::string::npos) continue;
+    if (begin == std::string::npos || line.find("'robot' element") != std::string::npos) continue;  // no URDF
     const auto text = line.find("] ", begin);  // after "[file.cc:line]"
     std::string message = text == std::string::npos ? line.substr(begin) : line.substr(text + 2);
     while (!message.empty() && (message.back() == '.' || message.back() == '\n' || message.back() == '\r'))

@@ -143,7 +143,13 @@ Result<std::shared_ptr<const cv::Mat>> read_texture_image(const std::filesystem:
   if (!std::filesystem::is_regular_file(file, ignored)) {
     return Error{fmt::format("{}: no such texture image", file.string())};
   }
-  cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
+  cv::Mat image;
+  try {
+    image = cv::imread(file.string(), cv::IMREAD_COLOR);
+  } catch (const cv::Exception&) {  // larger than OpenCV allows
+    return Error{
+        fmt::format("{}: found an image that is too large or broken, expected PNG or JPEG", file.string())};
+  }
   if (image.empty())
     return Error{fmt::format("{}: found no image that can be read, expected PNG or JPEG", file.string())};
   return std::shared_ptr<const cv::Mat>(std::make_shared<cv::Mat>(std::move(image)));

@@ -255,6 +255,7 @@ Result<Calibration> read_camera_info(const Yaml& root, const std::string& file) 
   if (coefficients && coefficients->empty()) model = "none";
   read_distortion(fields, camera, model, name);
   refuse_part_of_image(fields, root);
+  out.T_body_camera = fields.transform("local_transform", true);  // RTAB-Map: base to camera
   fields.ignore({"camera_name", "rectification_matrix", "projection_matrix", "R", "P", "r", "p", "header",
                  "binning_x", "binning_y", "roi", "height", "width"});
   out.camera = camera;

@@ -156,11 +156,16 @@ Result<Calibration> read_orb_slam(const Yaml& root, const std::string& file, int
 }
 
 bool is_vins(const Yaml& root) {
-  return root.find("model_type") != nullptr && root.find("projection_parameters") != nullptr;
+  const bool lens = root.find("model_type") != nullptr && root.find("projection_parameters") != nullptr;
+  return lens || root.find("cam0_calib") != nullptr;
 }
 
 Result<Calibration> read_vins(const Yaml& root, const std::string& file) {
   Fields fields(root, file);
+  if (const Yaml* other = root.find("cam0_calib"); other != nullptr && root.find("model_type") == nullptr) {
+    return Error{fmt::format("{}: line {}: field cam0_calib: the lens is in another file, {}: give that one",
+                             file, other->line, described(*other))};
+  }
   Camera camera;
   camera.width = fields.pixels({"image_width"}, kSize).value_or(0);
   camera.height = fields.pixels({"image_height"}, kSize).value_or(0);

@@ -1,7 +1,8 @@
-// Calibrations that are no YAML: KITTI's and COLMAP's.
+// Calibrations that are no YAML: KITTI's, COLMAP's, and the INI form of ROS.
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 
 #include <Eigen/Core>
 #include <fmt/format.h>
@@ -143,6 +144,68 @@ Result<Calibration> read_colmap(const Line& line, const std::string& file) {
   return out;
 }
 
+/// The sections of an INI file whose values stand below their names (ost.txt of camera_calibration).
+struct Section {
+  std::string name;
+  std::size_t line = 0;
+  std::map<std::string, std::vector<double>> values;
+};
+
+std::vector<Section> sections_of(const std::vector<Line>& lines) {
+  std::vector<Section> sections;
+  std::string key;
+  for (const Line& line : lines) {
+    if (line.text.front() == '[' && line.text.back() == ']') {
+      sections.push_back({std::string(line.text.substr(1, line.text.size() - 2)), line.number, {}});
+      continue;
+    }
+    if (sections.empty()) continue;
+    const auto numbers = numbers_from(split_fields(line.text), 0);
+    if (!numbers) {
+      key = std::string(line.text);
+      continue;
+    }
+    auto& values = sections.back().values[key];
+    values.insert(values.end(), numbers->begin(), numbers->end());
+  }
+  return sections;
+}
+
+/// [image] with width and height, then a section for each camera with its matrix and distortion.
+Result<Calibration> read_ros_ini(const std::vector<Section>& sections, const std::string& file, int index) {
+  const auto at = static_cast<std::size_t>(index) + 1;
+  if (at >= sections.size()) {
+    return Error{fmt::format("{}: found {} cameras, expected number {}: choose with --camera", file,
+                             sections.size() - 1, index)};
+  }
+  const auto value = [](const Section& section, const char* key) {
+    const auto found = section.values.find(key);
+    return found == section.values.end() ? std::vector<double>{} : found->second;
+  };
+  const std::vector<double> width = value(sections[0], "width"), height = value(sections[0], "height");
+  const std::vector<double> k = value(sections[at], "camera matrix");
+  const auto pixels = [](const std::vector<double>& n) {
+    return n.size() == 1 && n[0] >= 1 && n[0] <= 65536 && std::floor(n[0]) == n[0];
+  };
+  const bool matrix = k.size() == 9 && k[0] > 0 && k[4] > 0 && k[1] == 0 && k[3] == 0 && k[8] == 1;
+  if (!pixels(width) || !pixels(height) || !matrix) {
+    return Error{
+        fmt::format("{}: line {}: section [{}] expected width and height in [image], and a camera matrix fx "
+                    "0 cx, 0 fy cy, 0 0 1",
+                    file, sections[at].line, sections[at].name)};
+  }
+  Calibration out;
+  out.format = "ROS camera_info (INI)";
+  Camera camera{
+      static_cast<int>(width[0]), static_cast<int>(height[0]), k[0], k[4], k[2], k[5], Distortion::none, {}};
+  const std::vector<double> d = value(sections[at], "distortion");
+  const char* model = d.empty() ? "none" : d.size() == 8 ? "rational_polynomial" : "plumb_bob";
+  if (const auto problem = set_distortion(camera, model, d))
+    return Error{fmt::format("{}: line {}: {}", file, sections[at].line, *problem)};
+  out.camera = camera;
+  return out;
+}
+
 }  // namespace
 
 std::optional<Result<Calibration>> read_text_dialect(std::string_view text, const std::string& file,
@@ -157,6 +220,13 @@ std::optional<Result<Calibration>> read_text_dialect(std::string_view text, cons
     odometry = odometry ||
                (fields.size() == 13 && fields[0].size() == 3 && fields[0][0] == 'P' && fields[0][2] == ':');
     if (is_colmap_row(fields)) rows.push_back(line);
+  }
+  const auto sections = sections_of(lines);
+  if (sections.size() > 1 && sections.front().name == "image") return read_ros_ini(sections, file, camera);
+  if (text.find("Camera-system parameters") != std::string_view::npos) {
+    return Result<Calibration>(Error{fmt::format(
+        "{}: this is Kalibr's report for people, expected the camchain.yaml that it writes beside it",
+        file)});
   }
   if (raw) return read_kitti_raw(lines, file, camera);
   if (odometry) return parse_kitti_calibration(text, file, camera);

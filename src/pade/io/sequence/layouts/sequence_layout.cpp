@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/foreign_file.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
@@ -83,7 +84,8 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
   if (!path_exists(folder)) return Error{fmt::format("{}: no such folder", folder.string())};
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) {
-    return Error{fmt::format("{}: is a file, expected the folder of a sequence", folder.string())};
+    return Error{fmt::format("{}: is a file, expected the folder of a sequence{}", folder.string(),
+                             advice_for(folder))};
   }
   if (path_exists(folder / "mav0" / "cam0") || path_exists(folder / "cam0" / "data.csv")) {
     return read_euroc_layout(folder, choice, report);

@@ -22,7 +22,10 @@ struct Side {
   const char* name;
   int height;  ///< of the images; the first version's are 4:3
 };
-constexpr Side kSides[] = {{"left", 480}, {"right", 480}, {"lcam_front", 640}, {"rcam_front", 640}};
+constexpr Side kSides[] = {
+    {"left", 480},      {"right", 480},      {"lcam_front", 640}, {"rcam_front", 640},  {"lcam_back", 640},
+    {"lcam_left", 640}, {"lcam_right", 640}, {"lcam_top", 640},   {"lcam_bottom", 640}, {"rcam_back", 640},
+    {"rcam_left", 640}, {"rcam_right", 640}, {"rcam_top", 640},   {"rcam_bottom", 640}};
 
 fs::path images_of(const fs::path& folder, const Side& side) {
   return folder / fmt::format("image_{}", side.name);
@@ -120,7 +123,12 @@ Result<SequenceListing> read_tartanair_layout(const fs::path& folder, const Layo
   }
   listing.pose_file = choice.poses == "groundtruth" ? poses_of(folder, side) : fs::path(choice.poses);
   auto trajectory = read_rows(listing.pose_file, report);
-  if (!trajectory) return trajectory.error();
+  if (!trajectory) {
+    const bool own = choice.poses == "groundtruth";
+    return own ? Error{fmt::format("{} (of TartanAir: `tx ty tz qx qy qz qw`, row i for image i)",
+                                   trajectory.error().message)}
+               : trajectory.error();
+  }
   listing.trajectory = std::move(*trajectory);
   listing.poses_of_body = listing.calibration.pose_convention != PoseConvention::camera_to_world_optical;
   listing.world_up = WorldUp{-Eigen::Vector3d::UnitZ(), true, "TartanAir layout"};  // north, east, down

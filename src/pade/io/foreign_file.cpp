@@ -1,0 +1,64 @@
+#include "pade/io/foreign_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace pade::io {
+
+std::string advice_for(const std::filesystem::path& file) {
+  constexpr std::string_view kUlog =
+      "a log of PX4: make tables of it (ulog2csv) and name them imu.csv (sensor_combined) and gnss.csv "
+      "(vehicle_gps_position)";
+  constexpr std::string_view kArduPilot =
+      "a log of ArduPilot: make tables of it (mavlogdump.py --format csv --types IMU, then GPS) and name "
+      "them "
+      "imu.csv and gnss.csv";
+  constexpr std::string_view kBag =
+      "a ROS bag: write its images into rgb/ named by their times, its poses as rows `time tx ty tz qx qy qz "
+      "qw`, its "
+      "sensors as tables (rostopic echo -p) imu.csv and gnss.csv";
+  constexpr std::string_view kFilm =
+      "a film: write its frames into rgb/ as PNG, named by their times in seconds";
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kKinds = {
+      {{".ulg", kUlog},
+       {".bin", kArduPilot},
+       {".log", kArduPilot},
+       {".tlog", kArduPilot},
+       {".bag", kBag},
+       {".mcap", kBag},
+       {".db3", kBag},
+       {".mp4", kFilm},
+       {".mov", kFilm},
+       {".avi", kFilm},
+       {".mkv", kFilm},
+       {".webm", kFilm}}};
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const auto& [known, advice] : kKinds) {
+    if (ending == known) return fmt::format("; it looks like {} (docs/formats.md)", advice);
+  }
+  return {};
+}
+
+std::string found_files(const std::filesystem::path& folder, const std::string& ending) {
+  std::vector<std::string> names;
+  std::error_code failure;
+  for (std::filesystem::directory_iterator entry(folder, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    if (entry->path().extension() == ending) names.push_back(entry->path().filename().string());
+  }
+  if (names.empty()) return {};
+  std::sort(names.begin(), names.end());
+  constexpr std::size_t kMost = 6;
+  const bool more = names.size() > kMost;
+  if (more) names.resize(kMost);
+  return fmt::format("; found {}{}", fmt::join(names, ", "), more ? " ..." : "");
+}
+
+}  // namespace pade::io

@@ -1,0 +1,29 @@
+// What lies around a place: the nearest obstacle in each direction, as autopilots take it, and where the
+// known space ends.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "pade/mapping/query/map_view.hpp"
+
+namespace pade::mapping {
+
+inline constexpr std::size_t kSectors = 72;  ///< of 5 degrees, as in MAVLink's OBSTACLE_DISTANCE
+
+/// Horizontal distance to the nearest voxel that blocks in each sector, in metres; infinity where there is
+/// none. Sector 0 is centred on the world's x axis, the others follow counter-clockwise (towards y).
+/// @param place  world, m
+/// @param reach  m
+/// @param below  of the voxels that count, and
+/// @param above  how far they lie from the place, m
+std::array<double, kSectors> sectors(const MapView& view, const Eigen::Vector3d& place, double reach,
+                                     double below, double above, UnknownSpace unknown);
+
+/// Centres of the free voxels in a box (world, m) that share a face with an unknown one, z slowest.
+std::vector<Eigen::Vector3d> frontiers(const MapView& view, const Eigen::AlignedBox3d& box);
+
+}  // namespace pade::mapping

@@ -1,0 +1,42 @@
+// Makes trees of tiles from an octree, whole or where it has changed, and trees with other tiles in some
+// places.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "pade/mapping/query/tile_tree.hpp"
+
+namespace octomap {
+class OcTree;
+}  // namespace octomap
+
+namespace pade::mapping {
+
+/// A cube of the octree by the Morton code of its lower corner.
+struct TouchedCube {
+  std::uint64_t code = 0;
+  unsigned depth = 0;
+};
+
+/// Nothing is known.
+TileTree empty_tiles(const octomap::OcTree& octree);
+
+/// The tree with the cubes taken from the octree anew.
+/// @param touched  in Morton order, disjoint
+/// @param window   in tiles; outside all is unknown
+TileTree rebuilt(TileTree tiles, const octomap::OcTree& octree, std::span<const TouchedCube> touched,
+                 const TileBounds& window);
+
+/// The tree with other tiles in some places (tile coordinates, each once).
+TileTree with_tiles(TileTree tiles, std::vector<std::pair<VoxelIndex, std::shared_ptr<const Tile>>> changed);
+
+/// The tiles that a box (world, m) touches, as far as they can be addressed.
+TileBounds tiles_of(const Eigen::AlignedBox3d& box, double voxel);
+
+}  // namespace pade::mapping

@@ -1,0 +1,21 @@
+// A route on its map, from above.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "pade/mapping/query/map_view.hpp"
+
+namespace pade::evaluation {
+
+/// An SVG picture seen along the z axis: of the heights that the ball passes, black where something is
+/// occupied, white where something is free and nothing occupied, grey where all is unknown.
+/// @param points   of the motion, world, m; at least one
+/// @param corners  of the straight lines behind it, world, m
+/// @param radius   of the ball, m
+std::string route_picture(const mapping::MapView& view, std::span<const Eigen::Vector3d> points,
+                          std::span<const Eigen::Vector3d> corners, double radius);
+
+}  // namespace pade::evaluation

@@ -1,0 +1,140 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "pade/mapping/query/distance_field.hpp"
+#include "pade/mapping/query/surroundings.hpp"
+
+#include "mapping/query/random_map.hpp"
+
+namespace pade::mapping {
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+bool is_blocked(Occupancy state, UnknownSpace unknown) {
+  return state == Occupancy::occupied || (state == Occupancy::unknown && unknown == UnknownSpace::blocked);
+}
+
+TEST(DistanceField, HasTheDistanceToTheNearestOfAllVoxels) {
+  const OccupancyMap map = random_map(11);
+  const auto view = MapView::of(map);
+  const AlignedBox3d box(Vector3d(-1.5, -1, -0.7), Vector3d(1.2, 1.3, 0.6));
+  constexpr double kMost = 0.8;
+  for (const UnknownSpace unknown : {UnknownSpace::blocked, UnknownSpace::free}) {
+    const DistanceField field = DistanceField::of(*view, box, unknown, kMost);
+    std::vector<Vector3d> blocked;
+    Vector3i v;
+    for (v.z() = 0; v.z() < field.size().z(); ++v.z())
+      for (v.y() = 0; v.y() < field.size().y(); ++v.y())
+        for (v.x() = 0; v.x() < field.size().x(); ++v.x())
+          if (is_blocked(map.at(field.centre(v)), unknown)) blocked.push_back(field.centre(v));
+    ASSERT_FALSE(blocked.empty());
+    std::mt19937_64 random(11);
+    for (int i = 0; i < 1000; ++i) {
+      for (int axis = 0; axis < 3; ++axis)
+        v[axis] = std::uniform_int_distribution<int>(0, field.size()[axis] - 1)(random);
+      double nearest = kMost;
+      for (const Vector3d& other : blocked) nearest = std::min(nearest, (other - field.centre(v)).norm());
+      ASSERT_NEAR(field.at(v), nearest, 1e-9) << v.transpose();
+      ASSERT_NEAR(field.distance(field.centre(v)), nearest, 1e-9);
+    }
+  }
+}
+
+TEST(DistanceField, RisesAlongItsGradient) {
+  const auto view = MapView::of(random_map(12));
+  const AlignedBox3d box(Vector3d(-2, -2, -1), Vector3d(2, 2, 1));
+  const DistanceField field = DistanceField::of(*view, box, UnknownSpace::free);
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> unit(0.05, 0.95);
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d share(unit(random), unit(random), unit(random));
+    const Vector3d at = box.min() + share.cwiseProduct(box.sizes());
+    const Vector3d gradient = field.gradient(at);
+    for (int axis = 0; axis < 3; ++axis) {
+      constexpr double kStep = 1e-7;
+      const Vector3d step = kStep * Vector3d::Unit(axis);
+      const double slope = (field.distance(at + step) - field.distance(at - step)) / (2 * kStep);
+      EXPECT_NEAR(gradient[axis], slope, 1e-4);
+    }
+  }
+  EXPECT_TRUE(std::isnan(field.distance({9, 0, 0})));
+  EXPECT_TRUE(std::isnan(field.gradient({0, std::nan(""), 0}).x()));
+}
+
+TEST(Sectors, HaveTheNearestVoxelOfEachDirection) {
+  const OccupancyMap map = random_map(13);
+  const auto view = MapView::of(map);
+  const Vector3d place(0.33, -0.21, 0.14);
+  constexpr double kReach = 4;
+  for (const UnknownSpace unknown : {UnknownSpace::blocked, UnknownSpace::free}) {
+    const auto found = sectors(*view, place, kReach, 0.5, 0.5, unknown);
+    // Dense points of every voxel that blocks, by the octree.
+    std::array<double, kSectors> expected{};
+    expected.fill(std::numeric_limits<double>::infinity());
+    for (double x = -4.05; x < 5; x += 0.1) {
+      for (double y = -4.95; y < 5; y += 0.1) {
+        bool blocked = false;
+        for (double z = -0.35; z < 0.66; z += 0.1)
+          blocked = blocked || is_blocked(map.at({x, y, z}), unknown);
+        if (!blocked) continue;
+        for (int i = 0; i < 121; ++i) {
+          const double dx = x - 0.05 + 0.00999 * (i % 11) - place.x() + 1e-5;
+          const double dy = y - 0.05 + 0.00999 * (i / 11) - place.y() + 1e-5;  // NOLINT
+          const double distance = std::hypot(dx, dy);
+          if (distance > kReach) continue;
+          const auto sector =
+              static_cast<std::size_t>(std::lround(std::atan2(dy, dx) / (2 * std::numbers::pi) * 72) + 72) %
+              72;
+          expected[sector] = std::min(expected[sector], distance);
+        }
+      }
+    }
+    for (std::size_t i = 0; i < kSectors; ++i) {
+      // A voxel counts in all sectors that it touches, with its nearest point: never farther than what is
+      // there.
+      if (std::isfinite(expected[i])) {
+        EXPECT_LE(found[i], expected[i] + 1e-9) << i;
+      }
+      if (std::isfinite(found[i]) && found[i] < kReach - 0.2) {
+        EXPECT_GE(found[i], std::min({expected[i], expected[(i + 1) % 72], expected[(i + 71) % 72]}) - 0.12)
+            << i;
+      }
+    }
+  }
+}
+
+TEST(Frontiers, AreFreeVoxelsBesideUnknownOnes) {
+  const OccupancyMap map = random_map(14);
+  const auto view = MapView::of(map);
+  const AlignedBox3d box(Vector3d(-2, -2, -1), Vector3d(2, 2, 1));
+  const auto found = frontiers(*view, box);
+  std::size_t expected = 0;
+  for (double z = -0.95; z < 1; z += 0.1)
+    for (double y = -1.95; y < 2; y += 0.1)
+      for (double x = -1.95; x < 2; x += 0.1) {
+        if (map.at({x, y, z}) != Occupancy::free) continue;
+        bool beside = false;
+        for (int axis = 0; axis < 3; ++axis)
+          for (const double side : {-0.1, 0.1}) {
+            const Vector3d step = side * Vector3d::Unit(axis);
+            beside = beside || map.at(Vector3d(x, y, z) + step) == Occupancy::unknown;
+          }
+        expected += beside ? 1 : 0;
+      }
+  EXPECT_GT(expected, 100U);
+  // The box is rounded outwards to voxels: those at its upper border are ours too.
+  std::size_t inside = 0;
+  for (const Vector3d& at : found) inside += box.contains(at) ? 1 : 0;
+  EXPECT_EQ(inside, expected);
+}
+
+}  // namespace
+}  // namespace pade::mapping
