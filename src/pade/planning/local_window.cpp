@@ -56,8 +56,8 @@ void LocalWindow::copy(const mapping::Tile& tile, const Vector3i& corner) {
     const auto slice = static_cast<std::size_t>(z);
     for (int y = 0; y < kTile; ++y) {
       const std::size_t to = row(corner.y() + y, corner.z() + z) + word;
-      const std::uint64_t occupied = tile.occupied[slice] >> (kTile * y) & kByte;
-      const std::uint64_t known = tile.known[slice] >> (kTile * y) & kByte;
+      const std::uint64_t occupied = tile.words[slice].occupied >> (kTile * y) & kByte;
+      const std::uint64_t known = tile.words[slice].known >> (kTile * y) & kByte;
       occupied_[to] |= occupied << shift;
       free_[to] |= (known & ~occupied) << shift;
     }
