@@ -1,18 +1,16 @@
 #include "pade/simulation/sdf/sdf_reader.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <functional>
-#include <iostream>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <sdf/sdf.hh>
 
 #include "pade/io/text.hpp"
+#include "pade/simulation/sdf/sdf_console.hpp"
+#include "pade/simulation/sdf/sdf_pattern.hpp"
 #include "pade/simulation/sdf/sdf_repair.hpp"
 #include "pade/simulation/sdf/sdf_sensors.hpp"
 #include "pade/simulation/sdf/sdf_warnings.hpp"
@@ -52,40 +50,6 @@ Error error_of(const sdf::Error& error, const fs::path& file) {
                       colour ? "; expected red, green, blue and opacity from 0 to 1" : "")};
 }
 
-/// Keeps what libsdformat prints, since some of its errors are only printed.
-class ConsoleCapture {
- public:
-  ConsoleCapture() : previous_(stream().GetStream()), previous_errors_(std::cerr.rdbuf(text_.rdbuf())) {
-    stream().SetStream(&text_);
-  }
-  ~ConsoleCapture() {
-    stream().SetStream(previous_);
-    std::cerr.rdbuf(previous_errors_);
-  }
-  ConsoleCapture(const ConsoleCapture&) = delete;
-  ConsoleCapture& operator=(const ConsoleCapture&) = delete;
-  [[nodiscard]] std::string text() const { return text_.str(); }
-
- private:
-  static sdf::Console::ConsoleStream& stream() { return sdf::Console::Instance()->GetMsgStream(); }
-  std::ostringstream text_;
-  std::ostream* previous_;
-  std::streambuf* previous_errors_;  // included models report there
-};
-
-/// libsdformat asks the global callback, not that of the configuration, for the includes of included models.
-class FindCallback {
- public:
-  explicit FindCallback(std::function<std::string(const std::string&)> find) {
-    sdf::setFindCallback(std::move(find));
-  }
-  ~FindCallback() {
-    sdf::setFindCallback([](const std::string&) { return std::string(); });
-  }
-  FindCallback(const FindCallback&) = delete;
-  FindCallback& operator=(const FindCallback&) = delete;
-};
-
 class Reader {
  public:
   Reader(fs::path file, ResourcePaths resources) : file_(std::move(file)), resources_(std::move(resources)) {}
@@ -108,7 +72,6 @@ class Reader {
   void add_light(const sdf::Light& light);
   Result<Material> material_of(const sdf::Material& source);
   void choose_colour(const sdf::Material& source, Material& material);
-  Status read_pattern(const sdf::ElementPtr& element, Material& material) const;
   [[nodiscard]] fs::path folder_of(const std::string& named_file) const {
     return named_file.empty() || named_file.front() == '<' ? file_.parent_path()
                                                            : fs::path(named_file).parent_path();
@@ -340,35 +303,6 @@ Status Reader::add_polylines(const sdf::ElementPtr& geometry, const Visual& visu
   return {};
 }
 
-Status Reader::read_pattern(const sdf::ElementPtr& element, Material& material) const {
-  if (!element || !element->HasElement("pade:pattern")) return {};
-  const sdf::ElementPtr pattern = element->GetElement("pade:pattern");
-  // libsdformat knows no line of an element that is not its own.
-  const std::string where =
-      place_of(pattern->LineNumber() ? pattern : element, file_.string()) + ": <pade:pattern>";
-  const auto name = pattern->GetValue() ? pattern->Get<std::string>() : std::string();
-  const auto kind = from_name<PatternKind>(name);
-  if (!kind) {
-    std::string names;
-    for (const auto& entry : EnumNames<PatternKind>::names)
-      names += (names.empty() ? "" : ", ") + std::string(entry.second);
-    return Error{fmt::format("{}: found '{}', expected one of {}", where, name, names)};
-  }
-  material.pattern.kind = *kind;
-  for (const auto& [key, field] :
-       {std::pair{"scale", &material.pattern.scale}, std::pair{"contrast", &material.pattern.contrast}}) {
-    if (!pattern->HasAttribute(key)) continue;
-    const auto text = pattern->GetAttribute(key)->GetAsString();
-    char* end = nullptr;
-    *field = std::strtod(text.c_str(), &end);
-    if (end == text.c_str() || *end != '\0' || !std::isfinite(*field) || *field < 0 ||
-        (*field == 0 && field == &material.pattern.scale)) {
-      return Error{fmt::format("{}: found {}=\"{}\", expected a positive number", where, key, text)};
-    }
-  }
-  return {};
-}
-
 /// The diffuse colour that the file gives, else what follows from what it does say.
 void Reader::choose_colour(const sdf::Material& source, Material& material) {
   const sdf::ElementPtr element = source.Element();
@@ -424,7 +358,7 @@ Result<Material> Reader::material_of(const sdf::Material& source) {
     if (!source.Element() || !source.Element()->HasElement("diffuse"))
       material.colour = Eigen::Vector3d::Ones();
   }
-  if (const Status s = read_pattern(source.Element(), material); !s) return s.error();
+  if (const Status s = read_pattern(source.Element(), file_, material); !s) return s.error();
   return material;
 }
 
