@@ -320,11 +320,10 @@ void ObstacleMapper::refine(Pair& pair, const Frame& reference) {
 }
 
 /// Aligns the newest frame with the depth of the last one.
-depth::AlignedMotion ObstacleMapper::align(const RelativeMotion& given, const Pair& pair,
-                                           const Frame& newest) {
+depth::AlignedMotion ObstacleMapper::align(const Pair& pair, const Frame& newest) {
   const Frame& last = recent_.last().frame;
   if (update_.views == 0 || update_.depth.time != last.time) return {pair.motion};
-  depth::AlignmentInput input{camera_, newest.image, last.image, update_.depth, given, pair.motion};
+  depth::AlignmentInput input{camera_, newest.image, last.image, update_.depth, pair.motion, pair.motion};
   for (const int frames : seen_from_) {
     if (frames >= recent_.size()) break;
     const Frame& view = recent_.before(frames + 1).frame;
@@ -345,7 +344,7 @@ void ObstacleMapper::refine_by_depth(const RelativeMotion& given, Pair& pair, co
     baselines_.clear();
     return;
   }
-  const depth::AlignedMotion aligned = align(given, pair, newest);
+  const depth::AlignedMotion aligned = align(pair, newest);
   RelativeMotion motion = aligned.motion;
   const double length = motion.t_reference_other.norm();
   if (!(length > 0)) {

@@ -191,7 +191,7 @@ class ObstacleMapper {
   Pair match(const Frame& reference, const Frame& other, const RelativeMotion& motion,
              flow::FlowEstimator& method, const cv::Mat& initial);
   void refine(Pair& pair, const Frame& reference);
-  depth::AlignedMotion align(const RelativeMotion& given, const Pair& pair, const Frame& newest);
+  depth::AlignedMotion align(const Pair& pair, const Frame& newest);
   void refine_by_depth(const RelativeMotion& given, Pair& pair, const Frame& newest);
   void place(TrackedFrame& newest, const TrackedFrame& older) const;
   [[nodiscard]] int longer_step(const Frame& newest, const Pair& first) const;

@@ -59,12 +59,13 @@ struct AlignmentInput {
     const cv::Mat& image;  ///< CV_8UC1
     Pose T_view_last;      ///< of its camera
   };
-  const Camera& camera;         ///< undistorted pinhole of all frames
-  const cv::Mat& newest;        ///< CV_8UC1, the reference of the motion
-  const cv::Mat& last;          ///< CV_8UC1, the frame before
-  const DepthImage& depth;      ///< of `last`, window 1
-  const RelativeMotion& prior;  ///< of `last` seen from `newest`, with its covariance
-  const RelativeMotion& start;  ///< where the search begins: what the flow has made of the prior
+  const Camera& camera;     ///< undistorted pinhole of all frames
+  const cv::Mat& newest;    ///< CV_8UC1, the reference of the motion
+  const cv::Mat& last;      ///< CV_8UC1, the frame before
+  const DepthImage& depth;  ///< of `last`, window 1
+  const RelativeMotion&
+      prior;  ///< of `last` seen from `newest`, with its covariance, as the flow has refined it
+  const RelativeMotion& start;  ///< where the search begins
   std::vector<View> views{};    ///< further frames that see the same points, shortest baseline first
 };
 
