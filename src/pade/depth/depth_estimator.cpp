@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/depth/depth_kernel.hpp"
 #include "pade/depth/derotation.hpp"
 #include "pade/depth/texture.hpp"
@@ -11,7 +12,6 @@
 namespace pade::depth {
 namespace {
 
-constexpr double kMedianToSigma = 1.4826;
 constexpr double kLeastFlowSigma = 0.01;   // px; no flow method is better, and thresholds need a scale
 constexpr double kUnknownFlowSigma = 0.5;  // px, where too few pixels are left to measure it
 constexpr std::size_t kFewestSamples = 50;
@@ -41,9 +41,7 @@ double across_sigma(const std::vector<FlowSample>& samples, const Camera& camera
     if (length > 0) residuals.push_back(std::abs(a.x() * s.flow.y() - a.y() * s.flow.x()) / length);
   }
   if (residuals.size() < kFewestSamples) return kUnknownFlowSigma;
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  return std::max(kLeastFlowSigma, kMedianToSigma * *middle);
+  return std::max(kLeastFlowSigma, median_to_sigma * median(residuals));
 }
 
 void copy_turn(const Eigen::Matrix3d& rotation, float* turn) {

@@ -13,12 +13,10 @@
 namespace pade::depth {
 namespace {
 
-constexpr std::size_t kFewest = 20;
+constexpr std::size_t kFewestVectors = 20;
 constexpr int kHypotheses = 100;
 constexpr int kJudges = 100;
-constexpr int kIterations = 15;
-constexpr double kMedianToSigma = 1.4826;
-constexpr double kTukey = 4.685;  // 95 % efficiency on normal noise
+constexpr int kFocusIterations = 15;
 constexpr double kLeastSigma = 1e-4;
 constexpr double kRunaway = 10;  // times the farthest focus: there is no way back
 
@@ -71,7 +69,7 @@ bool is_singular(const Eigen::Matrix2d& information) {
 }  // namespace
 
 std::optional<FocusOfExpansion> focus_of_expansion(const std::vector<FlowSample>& samples, double farthest) {
-  if (samples.size() < kFewest) return std::nullopt;
+  if (samples.size() < kFewestVectors) return std::nullopt;
 
   const auto start = best_intersection(samples);
   if (!start) return std::nullopt;
@@ -83,16 +81,16 @@ std::optional<FocusOfExpansion> focus_of_expansion(const std::vector<FlowSample>
   Eigen::Matrix2d information;
   double sigma = 0;
   std::vector<double> residuals(samples.size());
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  for (int iteration = 0; iteration < kFocusIterations; ++iteration) {
     std::transform(samples.begin(), samples.end(), residuals.begin(),
                    [&](const FlowSample& s) { return std::abs(across(s, e)); });
-    sigma = std::max(kLeastSigma, kMedianToSigma * median(residuals));
+    sigma = std::max(kLeastSigma, median_to_sigma * median(residuals));
 
     information.setZero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
     for (const FlowSample& s : samples) {
       const double residual = across(s, e);
-      const double r = residual / (kTukey * sigma);
+      const double r = residual / (tukey_reach * sigma);
       if (std::abs(r) >= 1) continue;
       const Eigen::Vector2d arm = s.position - e;
       const double length = std::max(arm.norm(), 1.0);

@@ -6,6 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/core/depth_image.hpp"
 #include "pade/depth/depth_kernel.hpp"
 #include "pade/depth/derotation.hpp"
@@ -16,7 +17,6 @@ constexpr double kSobelSum = 8;  // a unit ramp gives 8
 constexpr double kSobelNoise =
     0.433012701892219;               // sqrt(12) / 8: gradient noise per grey level of image noise
 constexpr double kLeastNoise = 0.5;  // grey levels; rounding alone is 0.29, and its contours are no texture
-constexpr double kMedianToSigma = 1.4826;  // of a normal distribution
 
 struct Gradients {
   explicit Gradients(const cv::Mat& image) { cv::spatialGradient(image, x, y, 3, cv::BORDER_REPLICATE); }
@@ -30,7 +30,7 @@ struct Gradients {
 
 // The epipole within this many pixels of a block's centre: the epipolar line has no one direction in its
 // window.
-constexpr double kEpipoleRadius = 2 * kTextureBlock;
+constexpr double kEpipoleReach = 2 * kTextureBlock;
 // Where |a| is not this many sigmas of itself, the line may run in any direction (at 2: +-30 degrees).
 constexpr double kDirectionSigmas = 2;
 
@@ -92,7 +92,7 @@ Lines epipolar_lines(const Camera& camera, const RelativeMotion& motion, const c
       A << camera.fx, 0, -p.x(), 0, camera.fy, -p.y();
       const double variance = (A * covariance * A.transpose()).trace();
       const double least =
-          std::max(kEpipoleRadius * std::abs(t.z()), kDirectionSigmas * std::sqrt(std::max(0.0, variance)));
+          std::max(kEpipoleReach * std::abs(t.z()), kDirectionSigmas * std::sqrt(std::max(0.0, variance)));
       const bool unknown = !(a.norm() > least);
       lines.unknown.at<std::uint8_t>(r, c) = unknown ? 255 : 0;
       const Eigen::Vector2f e = a.normalized().cast<float>();
@@ -210,12 +210,9 @@ double image_noise(const cv::Mat& first, const cv::Mat& second, const FlowField&
   std::vector<float> differences;
   std::transform(samples.begin(), quarter, std::back_inserter(differences),
                  [](const Sample& s) { return s.difference; });
-  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-  std::nth_element(differences.begin(), middle, differences.end());
-  const float offset = *middle;  // a change of exposure is not noise
+  const float offset = median(differences);  // a change of exposure is not noise
   for (float& difference : differences) difference = std::abs(difference - offset);
-  std::nth_element(differences.begin(), middle, differences.end());
-  return std::max(kLeastNoise, kMedianToSigma / std::sqrt(2.0) * static_cast<double>(*middle));
+  return std::max(kLeastNoise, median_to_sigma / std::sqrt(2.0) * static_cast<double>(median(differences)));
 }
 
 cv::Mat texture_gate(const cv::Mat& reference, const cv::Mat& other, const FlowField& flow,

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
@@ -43,10 +44,7 @@ double median_step(std::span<const std::string_view> stamps) {
     if (std::isfinite(step) && step > 0) steps.push_back(step);
     last = value;
   }
-  if (steps.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median(steps);
 }
 
 std::string_view name_of(TimeUnit unit) {

@@ -24,7 +24,8 @@ TEST(Median, IsTheUpperMiddleOfTheSortedValuesInWhateverOrderTheyCome) {
 
 TEST(Median, OfNothingIsWhatTheCallerSays) {
   EXPECT_TRUE(std::isnan(median(std::vector<double>())));
-  EXPECT_EQ(median(std::vector<double>(), 7), 7);
+  EXPECT_EQ(median(std::vector<double>(), 7.0), 7);
+  EXPECT_EQ(median(std::vector<float>{3, 1, 2}), 2.0F);
 }
 
 }  // namespace

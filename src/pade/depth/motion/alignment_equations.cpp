@@ -5,14 +5,14 @@
 
 #include <Eigen/Cholesky>
 
+#include "pade/core/compute/median.hpp"
+
 namespace pade::depth {
 namespace {
 
-constexpr double kTukey = 4.685;  // 95 % efficiency on normal noise
-constexpr double kMedianToSigma = 1.4826;
-constexpr double kLeastNoise = 1;  // grey values
-constexpr float kNearest = 0.1F;   // m
-constexpr int kFewest = 2 * alignment_blocks_across * alignment_blocks_across;
+constexpr double kLeastNoise = 1;      // grey values
+constexpr float kNearestPoint = 0.1F;  // m
+constexpr int kFewestResiduals = 2 * alignment_blocks_across * alignment_blocks_across;
 
 /// A point as the newest frame sees it.
 struct Seen {
@@ -32,7 +32,7 @@ Weighed weigh(float residual, float spread, double noise) {
   const auto r = static_cast<double>(residual);
   const auto d = static_cast<double>(spread);
   const double variance = noise * noise + d * d;
-  const double outlying = r * r / (variance * kTukey * kTukey);
+  const double outlying = r * r / (variance * tukey_reach * tukey_reach);
   if (!(outlying < 1)) return {};
   const double weight = (1 - outlying) * (1 - outlying) / variance;
   return {weight, weight * r};
@@ -69,7 +69,7 @@ std::vector<Seen> see(const Camera& camera, const cv::Mat& image, int level,
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3f Y = R * points[i].X;
     const Eigen::Vector3f X = Y + t;
-    if (!(X.z() > kNearest)) continue;
+    if (!(X.z() > kNearestPoint)) continue;
     const float per_z = 1 / X.z();
     const float x = X.x() * per_z;
     const float y = X.y() * per_z;
@@ -91,22 +91,16 @@ std::vector<Seen> see(const Camera& camera, const cv::Mat& image, int level,
   return all;
 }
 
-float median(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-void measure(const std::vector<Seen>& all, const std::vector<MotionAligner::Point>& points,
-             AlignmentSums& sums) {
+void measure_scale(const std::vector<Seen>& all, const std::vector<MotionAligner::Point>& points,
+                   AlignmentSums& sums) {
   std::vector<float> sizes;
   sizes.reserve(all.size());
   for (const Seen& seen : all) sizes.push_back(std::abs(seen.grey - points[seen.point].grey));
-  sums.noise = std::max(kLeastNoise, kMedianToSigma * static_cast<double>(median(sizes)));
+  sums.noise = std::max(kLeastNoise, median_to_sigma * static_cast<double>(median(sizes)));
   for (std::size_t i = 0; i < all.size(); ++i) sizes[i] = points[all[i].point].grey;
   const float typical = median(sizes);
   for (float& size : sizes) size = std::abs(size - typical);
-  sums.contrast = kMedianToSigma * static_cast<double>(median(sizes));
+  sums.contrast = median_to_sigma * static_cast<double>(median(sizes));
 }
 
 }  // namespace
@@ -155,8 +149,8 @@ AlignmentSums alignment_sums(const Camera& camera, const cv::Mat& image, int lev
   AlignmentSums sums;
   const std::vector<Seen> all = see(camera, image, level, points, at);
   sums.used = static_cast<int>(all.size());
-  if (sums.used < kFewest) return sums;
-  measure(all, points, sums);
+  if (sums.used < kFewestResiduals) return sums;
+  measure_scale(all, points, sums);
   const double noise = sums.noise;
   for (const Seen& seen : all) {
     const MotionAligner::Point& point = points[seen.point];

@@ -7,27 +7,27 @@
 
 #include <Eigen/Cholesky>
 
+#include "pade/core/compute/median.hpp"
+
 namespace pade::depth {
 namespace {
 
-constexpr int kFewest = 50;
-constexpr double kLeastInliers = 0.4;
+constexpr int kFewestPixels = 50;
+constexpr double kLeastInlierShare = 0.4;
 constexpr int kIterations = 30;
-constexpr double kMedianToSigma = 1.4826;
-constexpr double kTukey = 4.685;  // 95 % efficiency on normal noise
 constexpr int kBlocksAcross = 6;  // blocks of pixels whose errors count as independent of each other
 constexpr int kBlocks = kBlocksAcross * kBlocksAcross;
 constexpr double kStartCorrelation = 4;  // before it is known
-constexpr double kNearest = 0.5;         // m: no pixel is nearer
+constexpr double kNearestPixel = 0.5;    // m: no pixel is nearer
 constexpr double kTypicalDepth = 8;      // m
 constexpr double kSettled = 0.9;         // of the robust scale before
 constexpr double kHoverParallax = 2;     // flow sigmas of median parallax
 constexpr double kLargestSigma = 1.5;    // px across the lines: more is no noise
 constexpr double kHoverDirection = 0.5;  // rad: a direction this uncertain is none
-constexpr double kSurprise = 40;         // chi-square of 6 degrees of freedom beyond 1 - 1e-6
+constexpr double kLargestSurprise = 40;  // chi-square of 6 degrees of freedom beyond 1 - 1e-6
 constexpr double kValidDirection = 0.1;  // rad
 constexpr double kLattice = 4;           // px between the candidates within a cell
-constexpr double kRadian = std::numbers::pi / 180;
+constexpr double kDegree = std::numbers::pi / 180;
 
 Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -75,12 +75,6 @@ struct Chart {
   }
 };
 
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Sums over all matches at one motion, in units of the prior: z with (dt, dtheta) = S z, z ~ N(0, I).
 struct Sums {
   Matrix6d information = Matrix6d::Zero();  // sum of w g g^T / sigma^2, without what noise alone adds to it
@@ -122,7 +116,7 @@ class Problem {
       parallaxes_.push_back(std::abs(lines_[i].along));
     }
     if (residuals_.empty()) return;
-    out.flow_sigma = std::max(least_sigma_, kMedianToSigma * median(residuals_));
+    out.flow_sigma = std::max(least_sigma_, median_to_sigma * median(residuals_));
     out.parallax = median(parallaxes_);
   }
 
@@ -134,11 +128,11 @@ class Problem {
       const AcrossLine& line = lines_[i];
       if (!std::isfinite(line.residual)) continue;
       const double sigma = out.flow_sigma * matches_[i].sigma;
-      const double u = line.residual / (kTukey * sigma);
+      const double u = line.residual / (tukey_reach * sigma);
       if (std::abs(u) >= 1) continue;
-      if (!coarse && line.along < -kTukey * sigma) continue;  // behind the cameras
+      if (!coarse && line.along < -tukey_reach * sigma) continue;  // behind the cameras
       // Near the epipole noise makes any inverse depth, along / length, and with it any derivative by t.
-      if (std::abs(line.along) > line.length / kNearest) continue;
+      if (std::abs(line.along) > line.length / kNearestPixel) continue;
       ++out.inliers;
       const double trusted = line.length * line.length;
       const double doubtful = std::pow(kTypicalDepth * sigma, 2);
@@ -184,9 +178,9 @@ struct Measurement {
 
 /// Precision of the error that all pixels share.
 Matrix6d precision_of_floor(const RelativeMotion& motion, const MotionRefinementOptions& options) {
-  const double across = motion.t_reference_other.norm() * options.direction_floor_deg * kRadian;
+  const double across = motion.t_reference_other.norm() * options.direction_floor_deg * kDegree;
   Vector6d sigma;
-  sigma << Eigen::Vector3d::Constant(across), Eigen::Vector3d::Constant(options.rotation_floor_deg * kRadian);
+  sigma << Eigen::Vector3d::Constant(across), Eigen::Vector3d::Constant(options.rotation_floor_deg * kDegree);
   constexpr double kLeast = 1e-9;
   return sigma.cwiseMax(kLeast).cwiseAbs2().cwiseInverse().asDiagonal();
 }
@@ -201,8 +195,8 @@ Measurement measurement(const Sums& sums, const Matrix6d& floor, double inflatio
   if (!(correlation > 0)) {
     // The scatter of the blocks' gradients over what independent pixels would have, where the flow has a say.
     const Matrix6d posterior = inverse(variance + Matrix6d::Identity());
-    constexpr double kLeastSlope = 0.3;
-    const double slope = std::max(kLeastSlope, sums.slope);
+    constexpr double kLeastSlopeOfScale = 0.3;
+    const double slope = std::max(kLeastSlopeOfScale, sums.slope);
     const double expected = (posterior * sums.variance).trace();
     const double found = (posterior * sums.scatter).trace() / (slope * slope);
     correlation = inflation * (expected > 0 ? std::max(1.0, found / expected) : 1.0);
@@ -360,7 +354,7 @@ RefinedMotion MotionRefiner::refine(const RefinementInput& input) {
   select(input);
   RefinedMotion out;
   out.pixels = static_cast<int>(matches_.size());
-  if (out.pixels < kFewest) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
+  if (out.pixels < kFewestPixels) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
 
   const Chart chart{prior};
   const Matrix6d root = square_root(prior.covariance);
@@ -377,7 +371,7 @@ RefinedMotion MotionRefiner::refine(const RefinementInput& input) {
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const double scale = sums.flow_sigma;
     sums = problem.sums(z, coarse);
-    if (sums.inliers < kFewest) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
+    if (sums.inliers < kFewestPixels) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
     if (coarse && iteration > 1 && sums.flow_sigma > kSettled * scale) coarse = false;
     if (coarse) sums.information = sums.variance;
     flow = measurement(sums, floor, options_.inflation, coarse ? kStartCorrelation : 0);
@@ -391,7 +385,7 @@ RefinedMotion MotionRefiner::refine(const RefinementInput& input) {
   out.flow_sigma = sums.flow_sigma;
   out.correlation = flow.correlation;
   out.inlier_share = static_cast<double>(sums.inliers) / static_cast<double>(matches_.size());
-  if (sums.inliers < kFewest) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
+  if (sums.inliers < kFewestPixels) return unchanged(prior, RefinementOutcome::too_few_pixels, out);
   if (sums.parallax < kHoverParallax * sums.flow_sigma) {
     const bool noisy = sums.flow_sigma > kLargestSigma;
     return unchanged(prior, noisy ? RefinementOutcome::inconsistent : RefinementOutcome::hover, out);
@@ -399,7 +393,7 @@ RefinedMotion MotionRefiner::refine(const RefinementInput& input) {
 
   const Matrix6d posterior = inverse(flow.information + identity);
   out.surprise = z.squaredNorm();
-  if (out.surprise > kSurprise || out.inlier_share < kLeastInliers) {
+  if (out.surprise > kLargestSurprise || out.inlier_share < kLeastInlierShare) {
     return unchanged(prior, RefinementOutcome::inconsistent, out);
   }
   const Vector6d step = root * z;

@@ -13,12 +13,12 @@
 namespace pade::depth {
 namespace {
 
-constexpr float kEpipoleRadius = 5;    // px: nearer to the epipole the parallax of a pair says little
-constexpr float kNearest = 0.05F;      // m
-constexpr int kBoundRadius = 2;        // px
-constexpr float kTexture = 1.6F;       // least squared slopes, in those of noise
-constexpr float kClearTexture = 2.4F;  // ... of a pixel that has a bound, but no depth
-constexpr float kVague = 0.5F;         // px: sigma of the parallax from which on the image says nothing of it
+constexpr float kEpipoleRadius = 5;     // px: nearer to the epipole the parallax of a pair says little
+constexpr float kNearestDepth = 0.05F;  // m
+constexpr int kBoundRadius = 2;         // px
+constexpr float kTexture = 1.6F;        // least squared slopes, in those of noise
+constexpr float kClearTexture = 2.4F;   // ... of a pixel that has a bound, but no depth
+constexpr float kVague = 0.5F;  // px: sigma of the parallax from which on the image says nothing of it
 
 constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
 
@@ -46,7 +46,7 @@ cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Ca
   p.fy_ty = p.fy * t.y();
   p.tz = t.z();
   p.damping = std::pow(kEpipoleRadius * t.norm(), 2.0F);
-  p.most = 1 / kNearest;
+  p.most = 1 / kNearestDepth;
   p.width = flow.cols;
   p.height = flow.rows;
   p.agreement = static_cast<float>(options.agreement);

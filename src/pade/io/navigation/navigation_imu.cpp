@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/io/navigation/navigation_columns.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/navigation/navigation_table.hpp"
@@ -135,11 +136,6 @@ Status check_units(const std::vector<ImuSample>& samples, std::string_view name)
     force.push_back(sample.specific_force.norm());
     rate.push_back(sample.angular_rate.norm());
   }
-  const auto median = [](std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
   const double median_force = median(force);
   if (median_force > 0.7 && median_force < 1.4) {
     return Error{

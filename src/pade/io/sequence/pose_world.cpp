@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "pade/core/compute/median.hpp"
+
 namespace pade::io {
 namespace {
 
@@ -87,9 +89,7 @@ Eigen::Vector3d near_flight(std::span<const Pose> cameras) {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Pose& camera : cameras) values.push_back(camera.translation[axis]);
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    point[axis] = std::round(*middle);
+    point[axis] = std::round(median(values));
   }
   return point;
 }

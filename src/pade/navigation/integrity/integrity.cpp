@@ -11,7 +11,7 @@ constexpr double kRulingSigmas = 4;   // between the two ways, of the difference
 constexpr double kSettled = 3;        // s without an alarm
 constexpr double kCalm = 9;           // of the mean square of three innovations; 3 is expected
 constexpr int kMostOpenings = 3;      // in a row; then the errors are beyond what is linear
-constexpr double kHopeless = 10;      // s
+constexpr double kLostForGood = 10;   // s
 constexpr double kFastAverage = 1.5;  // s
 constexpr double kSlowAverage = 7.5;  // s
 constexpr int kLeastPositions = 5;
@@ -138,11 +138,11 @@ void Integrity::settle(Time now) {
 bool Integrity::hopeless(Time now) const {
   if (!lost || position_doubted) return false;
   if (!velocity_doubted && openings > kMostOpenings) return true;
-  if (seconds_between(lost_since, now) < kHopeless) return false;
+  if (seconds_between(lost_since, now) < kLostForGood) return false;
   if (velocity_doubted) return !calm(position, now);
   // A new start is for what velocities and inertial sensors make of each other; a magnetometer or positions
   // that are led astray are no reason.
-  return !calm(velocity, now) || seconds_between(last_opening, now) < kHopeless / 2;
+  return !calm(velocity, now) || seconds_between(last_opening, now) < kLostForGood / 2;
 }
 
 }  // namespace pade::navigation

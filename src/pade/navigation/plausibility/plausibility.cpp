@@ -313,8 +313,8 @@ double check_readings(const NavigationLog& log, const ForceMatch& given, std::ve
         fmt::format("give the latency (--gnss-latency {:.2f}), or correct the stamps", lag->seconds));
     return lag->seconds;
   }
-  constexpr double kHopeless = 3;  // m/s²
-  if (as_given > kHopeless) {
+  constexpr double kContradiction = 3;  // m/s²
+  if (as_given > kContradiction) {
     add(hints, "imu-contradiction", HintSeverity::error,
         fmt::format(
             "IMU and GNSS contradict each other by {:.1f} m/s² (flights of good logs: under 1), and neither "

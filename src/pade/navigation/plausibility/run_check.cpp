@@ -9,7 +9,7 @@
 namespace pade::navigation {
 namespace {
 
-void add(std::vector<Hint>& hints, std::string id, HintSeverity severity, std::string message,
+void say(std::vector<Hint>& hints, std::string id, HintSeverity severity, std::string message,
          std::string advice) {
   hints.push_back({std::move(id), severity, std::move(message), std::move(advice)});
 }
@@ -40,13 +40,13 @@ const char* name_of(SensorKind kind) {
 void check_integrity(const Health& health, std::vector<Hint>& hints) {
   const std::uint64_t gaps = health.restarts - health.restarts_when_lost;
   if (gaps > 0) {
-    add(hints, "restarts", HintSeverity::warning,
+    say(hints, "restarts", HintSeverity::warning,
         fmt::format("the filter had to start anew {} times: the IMU log has gaps that cannot be bridged",
                     gaps),
         "record without gaps of more than 3 s");
   }
   if (health.times_lost > 0) {
-    add(hints, "lost", HintSeverity::warning,
+    say(hints, "lost", HintSeverity::warning,
         fmt::format("the filter was lost {} times (its innovations refuted its covariance) and had to start "
                     "anew {} times because of it; then no length and no direction is called valid",
                     health.times_lost, health.restarts_when_lost),
@@ -54,7 +54,7 @@ void check_integrity(const Health& health, std::vector<Hint>& hints) {
         "class of IMU (--imu), a latency");
   }
   if (health.velocity_doubted > 0) {
-    add(hints, "velocity-doubted", HintSeverity::warning,
+    say(hints, "velocity-doubted", HintSeverity::warning,
         fmt::format("the velocities of the GNSS contradicted its positions {} times and were not used until "
                     "they agreed again",
                     health.velocity_doubted),
@@ -94,7 +94,7 @@ std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health
   const double refused_imu =
       imu_samples > 0 ? static_cast<double>(health.imu_refused) / static_cast<double>(imu_samples) : 0;
   if (refused_imu > kSomeRefused) {
-    add(hints, "imu-refused", refused_imu > 0.3 ? HintSeverity::error : HintSeverity::warning,
+    say(hints, "imu-refused", refused_imu > 0.3 ? HintSeverity::error : HintSeverity::warning,
         fmt::format("{:.0f} % of the IMU samples were refused: not later than the one before, or not finite",
                     100 * refused_imu),
         "look at the stamps of imu.csv: they must rise");
@@ -105,7 +105,7 @@ std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health
     constexpr double kMostRefused = 0.3;
     constexpr double kInconsistent = 10;  // times what the sigmas allow
     if (refused > kMostRefused) {
-      add(hints, "sensor-refused", HintSeverity::error,
+      say(hints, "sensor-refused", HintSeverity::error,
           fmt::format(
               "{:.0f} % of {} were refused by the filter (mean χ² {:.3g} per component, 1 is consistent)",
               100 * refused, sensor.sensor, sensor.chi_square),
@@ -113,7 +113,7 @@ std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health
               ? "check that height_m is in metres and up; leave baro.csv out where it disturbs"
               : "check clock, axes, units and sigmas of this sensor, and the lever arm (--lever-arm)");
     } else if (sensor.chi_square > kInconsistent) {
-      add(hints, "inconsistent", HintSeverity::warning,
+      say(hints, "inconsistent", HintSeverity::warning,
           fmt::format("{} disagree with the filter: mean χ² {:.3g} per component where 1 is consistent",
                       sensor.sensor, sensor.chi_square),
           "check clock, axes and units of this sensor; sigmas that are too small look like this too");

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/core/fingerprint.hpp"
 #include "pade/io/atomic_output.hpp"
 
@@ -71,11 +72,9 @@ std::optional<DepthImage> scaled(const DepthImage& image, const cv::Mat& truth, 
     }
   }
   if (ratios.empty()) return std::nullopt;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
   DepthImage out;
   out.time = full.time;
-  const double factor = 1 / static_cast<double>(*middle);
+  const double factor = 1 / static_cast<double>(median(ratios));
   out.depth = full.depth * factor;
   out.variance = full.variance * (factor * factor);
   out.state = full.state;
