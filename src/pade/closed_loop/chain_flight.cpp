@@ -23,6 +23,7 @@ using simulation::KinematicState;
 constexpr double kLongestStand = 60;  // s
 constexpr double kLookAhead = 0.02;   // s, over which a plan's acceleration is read
 constexpr double kClimbSpeed = 0.6;   // m/s
+constexpr double kAtTheGoal = 5;      // m from the true goal: what single-point GNSS can promise
 constexpr double kLost = 0.4;         // m from the plan: then it is made anew from where the vehicle is
 
 double processor_seconds() {
@@ -111,6 +112,7 @@ class ChainLoop {
   Vector3d ground_ = Vector3d::Zero(), map_start_ = Vector3d::Zero(),
            goal_ = Vector3d::Zero();           // goal: as navigation has the world
   std::optional<std::pair<Time, Pose>> last_;  // frame that the mapper has taken
+  Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
   double last_depth_ = 0;
   cv::Mat frozen_, image_;
   const MapperUpdate* update_ = nullptr;
@@ -208,6 +210,11 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
     say("frame skipped: " + update.reason);
     return;
   }
+  if (last_) {
+    out.given_step = (pose.translation - last_->second.translation).norm();
+    out.step = (mapper_.T_world_camera().translation - placed_).norm();
+  }
+  placed_ = mapper_.T_world_camera().translation;
   last_ = {stamp, pose};
   update_ = &update;
   anchor(stamp);
@@ -287,15 +294,18 @@ void ChainLoop::frame() {
   record_.frames.push_back(frame);
   const double began = processor_seconds();
   if (arrives) look(image_, stamp);
-  const Pose back = record_.T_world_map * vehicle_.believed();
-  record_.frames.back().drift = tick_ == 0 ? 0 : (back.translation - vehicle_.truth().position).norm();
+  const Eigen::Vector3d& truth = vehicle_.truth().position;
+  record_.frames.back().believed =
+      tick_ == 0 ? truth : (record_.T_world_map * vehicle_.believed()).translation;
+  record_.frames.back().drift = (record_.frames.back().believed - truth).norm();
   record_.frames.back().seconds = processor_seconds() - began;
 }
 
 Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>& observer) {
   const auto finish = [&](Outcome outcome) -> Result<ChainRecord> {
     record_.flight = watch_.finished(outcome);
-    record_.map = view_;
+    record_.view = view_;
+    record_.mapper = std::make_shared<ObstacleMapper>(std::move(mapper_));
     for (const ChainFrame& f : record_.frames) record_.seconds_blind += f.blind ? 1 / options_.frame_rate : 0;
     return std::move(record_);
   };
@@ -315,7 +325,8 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
     const auto until = static_cast<int>(tick_) + ticks;
     if (!fly_until(until)) {
       const Vector3d left = T_map_world_ * goal_ - vehicle_.believed().translation;
-      return finish(left.head<2>().norm() < options_.planner.arrival ? Outcome::arrived : Outcome::timed_out);
+      if (left.head<2>().norm() >= options_.planner.arrival) return finish(Outcome::timed_out);
+      return finish(watch_.goal_distance() < kAtTheGoal ? Outcome::arrived : Outcome::astray);
     }
     motion_ = std::move(next);
   }
@@ -323,6 +334,12 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
 }
 
 }  // namespace
+
+ObstacleMapperOptions ChainFlightOptions::outdoors() {
+  ObstacleMapperOptions options;
+  options.footing.on = true;
+  return options;
+}
 
 Result<ChainRecord> fly_chain(const FlightTask& task, const ChainFlightOptions& options,
                               const std::function<bool(const ChainMoment&)>& observer) {

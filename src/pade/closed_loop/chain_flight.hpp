@@ -22,7 +22,7 @@ namespace pade::closed_loop {
 
 struct ChainFlightOptions {
   planning::LocalPlannerOptions planner;
-  ObstacleMapperOptions mapper;
+  ObstacleMapperOptions mapper = outdoors();
   NavigatedVehicleOptions vehicle;
   simulation::ImageOptions image;
   FaultOptions fault;
@@ -51,6 +51,8 @@ struct ChainFlightOptions {
     field("exposure_time", self.exposure_time, "s, motion blur");
     field("width", self.width, "of the image, px");
   }
+  /// The sky over the ground is free.
+  static ObstacleMapperOptions outdoors();
 };
 
 /// What became of one image.
@@ -60,9 +62,13 @@ struct ChainFrame {
   int views = 0;         ///< that its depth was read from, beside the pair
   bool refined = false;  ///< its motion, by the images
   bool blind = false;    ///< nothing new was seen for too long: it brakes
-  double drift = 0;      ///< of the map's world from the true one since take-off, where the vehicle is, m
-  double tracking = 0;   ///< from where it was to be by its plan, m
-  double seconds = 0;    ///< of processor time, navigation to plan
+  Eigen::Vector3d believed =
+      Eigen::Vector3d::Zero();  ///< place, in the true world as it was found at take-off, m
+  double step = 0;              ///< length of the motion from the frame before, as mapped, m
+  double given_step = 0;        ///< and as navigation gave it, m
+  double drift = 0;     ///< of the map's world from the true one since take-off, where the vehicle is, m
+  double tracking = 0;  ///< from where it was to be by its plan, m
+  double seconds = 0;   ///< of processor time, navigation to plan
 };
 
 /// What there is to see of a flight, after each frame. Its parts are valid until the observer returns.
@@ -76,10 +82,11 @@ struct ChainMoment {
 struct ChainRecord {
   FlightRecord flight;
   std::vector<ChainFrame> frames;
-  std::vector<std::string> events;              ///< what a person should know, with the time
-  std::shared_ptr<const mapping::MapView> map;  ///< at the end, in the map's world
-  Pose T_world_map;                             ///< at take-off
-  double seconds_blind = 0;                     ///< s
+  std::vector<std::string> events;               ///< what a person should know, with the time
+  std::shared_ptr<const mapping::MapView> view;  ///< of the map at the end, in the map's world
+  std::shared_ptr<const ObstacleMapper> mapper;  ///< at the end
+  Pose T_world_map;                              ///< at take-off
+  double seconds_blind = 0;                      ///< s
 };
 
 /// Flies from start to goal, from a standstill below the start with the nose toward the goal, by its own

@@ -22,6 +22,7 @@ enum class Outcome {
   arrived,
   collided,
   timed_out,
+  astray,       ///< it believed itself at the goal, more than 5 m from it
   never_ready,  ///< the navigation knew no pose to take off with
 };
 
@@ -98,5 +99,6 @@ struct pade::EnumNames<pade::closed_loop::Outcome> {
   static constexpr std::array names = {std::pair{O::arrived, std::string_view("arrived")},
                                        std::pair{O::collided, std::string_view("collided")},
                                        std::pair{O::timed_out, std::string_view("timed out")},
+                                       std::pair{O::astray, std::string_view("astray")},
                                        std::pair{O::never_ready, std::string_view("never ready")}};
 };
