@@ -313,6 +313,7 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
   const auto finish = [&](Outcome outcome) -> Result<ChainRecord> {
     record_.flight = watch_.finished(outcome, climbed_);
     record_.view = view_;
+    record_.climbed = climbed_;
     record_.mapper = std::make_shared<ObstacleMapper>(std::move(mapper_));
     for (const ChainFrame& f : record_.frames) record_.seconds_blind += f.blind ? 1 / options_.frame_rate : 0;
     return std::move(record_);

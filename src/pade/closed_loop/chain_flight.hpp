@@ -89,6 +89,7 @@ struct ChainRecord {
   std::shared_ptr<const mapping::MapView> view;  ///< of the map at the end, in the map's world
   std::shared_ptr<const ObstacleMapper> mapper;  ///< at the end
   Pose T_world_map;                              ///< at take-off
+  double climbed = 0;                            ///< s, when it was at the height of the start
   double seconds_blind = 0;                      ///< s
 };
 
