@@ -187,8 +187,8 @@ TEST(LookKernels, GiveTheSameBitsOnEachInstructionSet) {
   constexpr int kHeight = 70;
   std::vector<float> ends(static_cast<std::size_t>(kWidth + 8) * kHeight);
   for (float& end : ends) end = static_cast<float>(6 + unit(random));
-  const EndsLevel level{ends.data(), kWidth + 8};
-  LookView view{90, 90, 49.5, 34.5, kWidth, kHeight, 20, {0.08, 0.08, 0.07}, {}, &level, 1};
+  const EndsLevel level{ends.data(), ends.data(), kWidth + 8};
+  LookView view{90, 90, 49.5, 34.5, kWidth, kHeight, 20, 0.1, {0.8, 0.8, 0.7}, {}, {}, &level, 1};
   for (auto& side : view.sides) side[2] = 1;
   std::uint64_t any = 0;
   for (int i = 0; i < 3000; ++i) {

@@ -324,15 +324,28 @@ Clearance::Extremes Clearance::over(int u0, int v0, int u1, int v1) const {
 
 LookView Clearance::for_voxels(std::vector<EndsLevel>& levels) const {
   levels.clear();
-  for (const Level& level : levels_) levels.push_back({level.nearest.data(), level.stride});
-  LookView view{camera_.fx, camera_.fy, camera_.cx, camera_.cy, camera_.width, camera_.height, parameters_.range,
-                {}, {}, levels.data(), static_cast<int>(levels.size())};
-  for (int axis = 0; axis < 3; ++axis) view.half[axis] = parameters_.voxel * reach_[axis];
+  for (const Level& level : levels_) {
+    const std::vector<float>& farthest = level.farthest.empty() ? level.nearest : level.farthest;
+    levels.push_back({level.nearest.data(), farthest.data(), level.stride});
+  }
+  LookView view{};
+  view.f_x = camera_.fx;
+  view.f_y = camera_.fy;
+  view.c_x = camera_.cx;
+  view.c_y = camera_.cy;
+  view.width = camera_.width;
+  view.height = camera_.height;
+  view.range = parameters_.range;
+  view.voxel = parameters_.voxel;
+  for (int axis = 0; axis < 3; ++axis) view.reach[axis] = reach_[axis];
   for (int i = 0; i < 4; ++i) {
     view.sides[i][0] = side_x_[i];
     view.sides[i][1] = side_y_[i];
     view.sides[i][2] = side_z_[i];
+    view.side_reach[i] = side_reach_[i];
   }
+  view.levels = levels.data();
+  view.level_count = static_cast<int>(levels.size());
   return view;
 }
 

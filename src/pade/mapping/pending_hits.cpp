@@ -6,8 +6,10 @@
 
 namespace pade::mapping {
 
+/// Voxels of one cube of 2 x 2 x 2 lie together.
 std::size_t PendingHits::home_of(std::uint64_t code) const {
-  return (code * 0x9e3779b97f4a7c15U >> 20U) & (slots_.size() - 1);
+  const std::uint64_t cube = (code >> 3U) * 0x9e3779b97f4a7c15U >> 20U;
+  return (cube << 3U | (code & 7U)) & (slots_.size() - 1);
 }
 
 /// Where it is, or the empty slot where it would be.
@@ -19,7 +21,7 @@ std::size_t PendingHits::slot_of(std::uint64_t code) const {
 
 const PendingHits::Evidence& PendingHits::add(std::uint64_t code, float weight, float points, int view) {
   constexpr std::size_t kSmallest = 1U << 10U;
-  if (2 * size_ >= slots_.size()) rehash(std::max(kSmallest, 2 * slots_.size()), std::numeric_limits<int>::min());
+  if (is_crowded()) rehash(std::max(kSmallest, 2 * slots_.size()), std::numeric_limits<int>::min());
   Slot& slot = slots_[slot_of(code)];
   Evidence& evidence = slot.evidence;
   const bool is_new = slot.code == kEmpty;
@@ -62,10 +64,10 @@ void PendingHits::erase(std::uint64_t code) {
 void PendingHits::forget_before(int view) { rehash(slots_.size(), view); }
 
 void PendingHits::rehash(std::size_t slots, int oldest_view) {
-  std::vector<Slot> old(slots);
-  old.swap(slots_);
+  spare_.assign(slots, {});
+  spare_.swap(slots_);
   size_ = 0;
-  for (const Slot& slot : old) {
+  for (const Slot& slot : spare_) {
     if (slot.code == kEmpty || slot.evidence.last_view < oldest_view) continue;
     slots_[slot_of(slot.code)] = slot;
     ++size_;

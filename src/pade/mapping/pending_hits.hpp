@@ -40,8 +40,10 @@ class PendingHits {
   [[nodiscard]] std::size_t home_of(std::uint64_t code) const;
   [[nodiscard]] std::size_t slot_of(std::uint64_t code) const;
   void rehash(std::size_t slots, int oldest_view);
+  [[nodiscard]] bool is_crowded() const { return 2 * size_ >= slots_.size(); }
 
   std::vector<Slot> slots_;  // open addressing; a power of two of them
+  std::vector<Slot> spare_;  // the slots of before
   std::size_t size_ = 0;
 };
 

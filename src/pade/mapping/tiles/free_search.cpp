@@ -12,12 +12,24 @@ constexpr std::uint64_t kAll = ~std::uint64_t{0};
 struct Kernels {
   decltype(&baseline::place_voxels) place;
   decltype(&baseline::move_voxels) move;
+  decltype(&baseline::move_corners) move_corners;
+  decltype(&baseline::look_at_eight) look_at_eight;
   decltype(&baseline::free_voxels) free;
 };
 
 Kernels kernels() {
   const simd::InstructionSet set = simd::best();
-  return {PADE_DISPATCH(place_voxels, set), PADE_DISPATCH(move_voxels, set), PADE_DISPATCH(free_voxels, set)};
+  return {PADE_DISPATCH(place_voxels, set), PADE_DISPATCH(move_voxels, set),
+          PADE_DISPATCH(move_corners, set), PADE_DISPATCH(look_at_eight, set), PADE_DISPATCH(free_voxels, set)};
+}
+
+/// Bit i becomes byte i.
+std::uint64_t bytes_of(unsigned bits) {
+  std::uint64_t spread = bits * 0x0101010101010101U & 0x8040201008040201U;
+  spread |= spread >> 4U & 0x0f0f0f0f0f0f0f0fU;
+  spread |= spread >> 2U & 0x3f3f3f3f3f3f3f3fU;
+  spread |= spread >> 1U & 0x7f7f7f7f7f7f7f7fU;
+  return (spread & 0x0101010101010101U) * 255U;
 }
 
 /// Walks space from the top as an octree, all in the camera's frame, down to tiles; below by 64 voxels at once.
@@ -116,8 +128,7 @@ class FreeSpaceSearch {
       const std::uint64_t asked = known != nullptr ? ~known->least[i] : kAll;
       if (asked == 0) continue;
       const Cube cube = part_of(tile, i);
-      is_placed_ = false;
-      const std::uint64_t shown = asked & shown_by_now(cube, seen, asked);
+      const std::uint64_t shown = shown_by_now(cube, seen, asked);
       if (shown == 0) continue;
       free.voxels[i] = alone_ ? shown : confirmed(cube, shown, open);
       pending_ += static_cast<std::size_t>(std::popcount(shown & ~free.voxels[i]));
@@ -126,23 +137,37 @@ class FreeSpaceSearch {
     if (any != 0) out_.push_back(free);
   }
 
-  /// Centres of the cube's voxels in the camera's frame.
-  const VoxelCentres& placed(const Cube& cube) {
-    if (is_placed_) return centres_;
-    std::array<double, 24> corners{};
+  /// Takes up a cube of 4 x 4 x 4 voxels, to be asked about by the functions below.
+  void take(const Cube& cube) {
     for (std::size_t j = 0; j < 8; ++j) {
       const Eigen::Vector3d corner = cube.centre + cube.side * to_child_[j];
-      for (std::size_t axis = 0; axis < 3; ++axis) corners[3 * j + axis] = corner[static_cast<int>(axis)];
+      for (std::size_t axis = 0; axis < 3; ++axis) corners_[3 * j + axis] = corner[static_cast<int>(axis)];
     }
-    kernels_.place(corners.data(), to_voxel_.data(), centres_);
+    is_placed_ = false;
+  }
+  const VoxelCentres& placed() {
+    if (!is_placed_) kernels_.place(corners_.data(), to_voxel_.data(), centres_);
     is_placed_ = true;
     return centres_;
+  }
+
+  /// Of the voxels asked for, those that are free in a view: cubes of 2 x 2 x 2 first.
+  template <class Place>
+  std::uint64_t free_in(const LookView& view, const double* corners, std::uint64_t asked, const Place& place) const {
+    unsigned free = 0;
+    unsigned nothing = 0;
+    kernels_.look_at_eight(view, corners, &free, &nothing);
+    const std::uint64_t whole = bytes_of(free) & asked;
+    const std::uint64_t open = asked & ~bytes_of(free | nothing);
+    return open == 0 ? whole : whole | kernels_.free(view, place(), open);
   }
 
   std::uint64_t shown_by_now(const Cube& cube, View seen, std::uint64_t asked) {
     if (seen != View::free) seen = now_.look_at(cube.centre, cube.side, false);
     if (seen == View::nothing) return 0;
-    return seen == View::free ? kAll : kernels_.free(view_, placed(cube), asked);
+    take(cube);
+    if (seen == View::free) return asked;
+    return free_in(view_, corners_.data(), asked, [&]() -> const VoxelCentres& { return placed(); });
   }
 
   /// Of `shown`, what a witness shows too.
@@ -154,9 +179,12 @@ class FreeSpaceSearch {
       const View view = look_from(witness, cube);
       if (view == View::free) return shown;
       if (view == View::nothing) continue;
-      VoxelCentres moved;
-      kernels_.move(witness.motion, placed(cube), moved);
-      rest &= ~kernels_.free(witness.view, moved, rest);
+      std::array<double, 24> corners{};
+      kernels_.move_corners(witness.motion, corners_.data(), corners.data());
+      rest &= ~free_in(witness.view, corners.data(), rest, [&]() -> const VoxelCentres& {
+        kernels_.move(witness.motion, placed(), moved_);
+        return moved_;
+      });
     }
     return shown & ~rest;
   }
@@ -172,7 +200,8 @@ class FreeSpaceSearch {
   std::vector<EndsLevel> levels_;
   LookView view_;
   std::vector<Witness> witnesses_;
-  VoxelCentres centres_{};
+  std::array<double, 24> corners_{};  // centres of its eight cubes of 2 x 2 x 2, in the camera's frame
+  VoxelCentres centres_{}, moved_{};
   bool is_placed_ = false;
   std::size_t pending_ = 0;
 };

@@ -17,36 +17,50 @@ struct Rows {
   return value > most ? most : value;
 }
 
+struct Cube {
+  double x, y, z;            // centre
+  double half_x, half_y;     // half extents
+  double per_near, per_far;  // 1 / Z of its ends
+};
+
 /// The arithmetic of Clearance::look_at().
-[[gnu::always_inline]] inline void project(const LookView& view, const double* x, const double* y, const double* z,
-                                           Rows& out) {
+[[gnu::always_inline]] inline void set_pixels(const LookView& view, const Cube& cube, int i, Rows& out) {
   constexpr double kRounding = 1e-9;
   const double most_u = view.width - 1.0;
   const double most_v = view.height - 1.0;
+  const double left = cube.x - cube.half_x - kRounding;
+  const double right = cube.x + cube.half_x + kRounding;
+  const double top = cube.y - cube.half_y - kRounding;
+  const double bottom = cube.y + cube.half_y + kRounding;
+  const double u0 = clamped(view.f_x * left * (left < 0 ? cube.per_near : cube.per_far) + view.c_x, most_u);
+  const double u1 = clamped(view.f_x * right * (right < 0 ? cube.per_far : cube.per_near) + view.c_x, most_u);
+  const double v0 = clamped(view.f_y * top * (top < 0 ? cube.per_near : cube.per_far) + view.c_y, most_v);
+  const double v1 = clamped(view.f_y * bottom * (bottom < 0 ? cube.per_far : cube.per_near) + view.c_y, most_v);
+  out.first_u[i] = static_cast<int>(u0 + 0.5);
+  out.last_u[i] = static_cast<int>(u1 + 0.5);
+  out.first_v[i] = static_cast<int>(v0 + 0.5);
+  out.last_v[i] = static_cast<int>(v1 + 0.5);
+}
+
+[[gnu::always_inline]] inline double along(const LookView& view, int side, double x, double y, double z) {
+  return view.sides[side][0] * x + view.sides[side][1] * y + view.sides[side][2] * z;
+}
+
+[[gnu::always_inline]] inline void project(const LookView& view, const double* x, const double* y, const double* z,
+                                           Rows& out) {
+  const double half_x = view.voxel * view.reach[0];
+  const double half_y = view.voxel * view.reach[1];
+  const double half_z = view.voxel * view.reach[2];
   for (int i = 0; i < kRow; ++i) {
-    const double z_near = z[i] - view.half[2];
-    const double z_far = z[i] + view.half[2];
-    const double a = view.sides[0][0] * x[i] + view.sides[0][1] * y[i] + view.sides[0][2] * z[i];
-    const double b = view.sides[1][0] * x[i] + view.sides[1][1] * y[i] + view.sides[1][2] * z[i];
-    const double c = view.sides[2][0] * x[i] + view.sides[2][1] * y[i] + view.sides[2][2] * z[i];
-    const double d = view.sides[3][0] * x[i] + view.sides[3][1] * y[i] + view.sides[3][2] * z[i];
-    const int is_inside = (a >= 0) & (b >= 0) & (c >= 0) & (d >= 0);
+    const double z_near = z[i] - half_z;
+    const double z_far = z[i] + half_z;
+    const int is_inside = (along(view, 0, x[i], y[i], z[i]) >= 0) & (along(view, 1, x[i], y[i], z[i]) >= 0) &
+                          (along(view, 2, x[i], y[i], z[i]) >= 0) & (along(view, 3, x[i], y[i], z[i]) >= 0);
     out.is_seen[i] = is_inside & (z_far > 0) & (z_near < view.range) & (z_near > 0.02 * z_far);
     out.z_far[i] = z_far;
     const double per_near = 1 / (out.is_seen[i] != 0 ? z_near : 1);
     const double per_far = 1 / (out.is_seen[i] != 0 ? z_far : 1);
-    const double left = x[i] - view.half[0] - kRounding;
-    const double right = x[i] + view.half[0] + kRounding;
-    const double top = y[i] - view.half[1] - kRounding;
-    const double bottom = y[i] + view.half[1] + kRounding;
-    const double u0 = clamped(view.f_x * left * (left < 0 ? per_near : per_far) + view.c_x, most_u);
-    const double u1 = clamped(view.f_x * right * (right < 0 ? per_far : per_near) + view.c_x, most_u);
-    const double v0 = clamped(view.f_y * top * (top < 0 ? per_near : per_far) + view.c_y, most_v);
-    const double v1 = clamped(view.f_y * bottom * (bottom < 0 ? per_far : per_near) + view.c_y, most_v);
-    out.first_u[i] = static_cast<int>(u0 + 0.5);
-    out.last_u[i] = static_cast<int>(u1 + 0.5);
-    out.first_v[i] = static_cast<int>(v0 + 0.5);
-    out.last_v[i] = static_cast<int>(v1 + 0.5);
+    set_pixels(view, {x[i], y[i], z[i], half_x, half_y, per_near, per_far}, i, out);
   }
 }
 
@@ -66,34 +80,60 @@ constexpr Eight kBeyond[kRow] = {
     {0, 0, 0, 0, 0, 0, 0, kFar},
 };
 
-/// Whether all pixels, or a few more (Clearance::over()), end behind z_far.
-[[gnu::always_inline]] inline bool is_before_all(const LookView& view, const Rows& rows, int i) {
-  const int u0 = rows.first_u[i];
-  const int v0 = rows.first_v[i];
-  const int u1 = rows.last_u[i];
-  const int v1 = rows.last_v[i];
+/// Cells of a level that hold the pixels of a cube, and a few more: Clearance::over().
+struct Cells {
+  const float* nearest;
+  const float* farthest;
+  int stride, columns, rows;
+};
+
+[[gnu::always_inline]] inline Cells cells_of(const LookView& view, const Rows& pixels, int i) {
+  const int u0 = pixels.first_u[i];
+  const int v0 = pixels.first_v[i];
+  const int u1 = pixels.last_u[i];
+  const int v1 = pixels.last_v[i];
   int level = 0;
   for (int extent = u1 - u0 > v1 - v0 ? u1 - u0 : v1 - v0; extent > 3 && level + 1 < view.level_count; extent /= 2)
     ++level;
   const EndsLevel& ends = view.levels[level];
-  const int left = u0 >> level;
-  const int count = (u1 >> level) - left + 1;  // 1 to 5
-  const int top = v0 >> level;
-  const int bottom = v1 >> level;
-  const float* row = ends.nearest + top * ends.stride + left;
-  if (!(row[0] > rows.z_far[i])) return false;
+  const int at = (v0 >> level) * ends.stride + (u0 >> level);
+  return {ends.nearest + at, ends.farthest + at, ends.stride, (u1 >> level) - (u0 >> level) + 1,
+          (v1 >> level) - (v0 >> level) + 1};
+}
+
+/// Nearest of the cells: of at most five columns.
+[[gnu::always_inline]] inline float nearest_of(const Cells& cells) {
   Eight least;
-  __builtin_memcpy(&least, row, sizeof least);
-  for (int v = top + 1; v <= bottom; ++v) {
-    row += ends.stride;
+  __builtin_memcpy(&least, cells.nearest, sizeof least);
+  for (int v = 1; v < cells.rows; ++v) {
     Eight next;
-    __builtin_memcpy(&next, row, sizeof next);
+    __builtin_memcpy(&next, cells.nearest + v * cells.stride, sizeof next);
     least = next < least ? next : least;
   }
-  least += kBeyond[count];
+  least += kBeyond[cells.columns];
   float nearest = least[0];
-  for (int k = 1; k < kRow; ++k) nearest = least[k] < nearest ? least[k] : nearest;
-  return nearest > rows.z_far[i];
+  for (int k = 1; k < 5; ++k) nearest = least[k] < nearest ? least[k] : nearest;
+  return nearest;
+}
+
+[[gnu::always_inline]] inline float farthest_of(const Cells& cells) {
+  Eight most;
+  __builtin_memcpy(&most, cells.farthest, sizeof most);
+  for (int v = 1; v < cells.rows; ++v) {
+    Eight next;
+    __builtin_memcpy(&next, cells.farthest + v * cells.stride, sizeof next);
+    most = next > most ? next : most;
+  }
+  most -= kBeyond[cells.columns];
+  float farthest = most[0];
+  for (int k = 1; k < 5; ++k) farthest = most[k] > farthest ? most[k] : farthest;
+  return farthest;
+}
+
+/// Whether all pixels, or a few more, end behind z_far.
+[[gnu::always_inline]] inline bool is_before_all(const LookView& view, const Rows& pixels, int i) {
+  const Cells cells = cells_of(view, pixels, i);
+  return cells.nearest[0] > pixels.z_far[i] && nearest_of(cells) > pixels.z_far[i];
 }
 
 }  // namespace
@@ -118,6 +158,60 @@ void move_voxels(const LookMotion& motion, const VoxelCentres& from, VoxelCentre
     out.y[i] = r[3] * x + r[4] * y + r[5] * z + motion.t[1];
     out.z[i] = r[6] * x + r[7] * y + r[8] * z + motion.t[2];
   }
+}
+
+void move_corners(const LookMotion& motion, const double* from, double* out) {
+  const double* r = motion.r;
+  for (int j = 0; j < 8; ++j) {
+    const double* p = from + 3 * j;
+    for (int row = 0; row < 3; ++row)
+      out[3 * j + row] = r[3 * row] * p[0] + r[3 * row + 1] * p[1] + r[3 * row + 2] * p[2] + motion.t[row];
+  }
+}
+
+void look_at_eight(const LookView& view, const double* corners, unsigned* free, unsigned* nothing) {
+  const double side = 2 * view.voxel;
+  Rows pixels;
+  double z_nears[kRow];  // NOLINT(*-avoid-c-arrays)
+  int is_whole[kRow];    // NOLINT(*-avoid-c-arrays)
+  int is_out[kRow];      // NOLINT(*-avoid-c-arrays)
+  for (int i = 0; i < kRow; ++i) {
+    const double x = corners[3 * i];
+    const double y = corners[3 * i + 1];
+    const double z = corners[3 * i + 2];
+    const double z_near = z - side * view.reach[2];
+    const double z_far = z + side * view.reach[2];
+    int is_beyond = (z_far <= 0) | (z_near >= view.range);
+    int is_inside = 1;
+    for (int k = 0; k < 4; ++k) {
+      const double inside = along(view, k, x, y, z);
+      is_beyond |= inside + side * view.side_reach[k] < 0;
+      is_inside &= inside - side * view.side_reach[k] >= 0;
+    }
+    is_out[i] = is_beyond;
+    is_whole[i] = is_inside;
+    pixels.is_seen[i] = (1 - is_beyond) & (z_near > 0.02 * z_far);
+    pixels.z_far[i] = z_far;
+    z_nears[i] = z_near;
+    const double per_near = 1 / (pixels.is_seen[i] != 0 ? z_near : 1);
+    const double per_far = 1 / (pixels.is_seen[i] != 0 ? z_far : 1);
+    set_pixels(view, {x, y, z, side * view.reach[0], side * view.reach[1], per_near, per_far}, i, pixels);
+  }
+  unsigned all = 0;
+  unsigned none = 0;
+  for (int i = 0; i < kRow; ++i) {
+    const unsigned bit = 1U << i;
+    if (is_out[i] != 0) none |= bit;
+    if (pixels.is_seen[i] == 0) continue;
+    const Cells cells = cells_of(view, pixels, i);
+    if (farthest_of(cells) <= z_nears[i]) {
+      none |= bit;
+    } else if (is_whole[i] != 0 && nearest_of(cells) > pixels.z_far[i]) {
+      all |= bit;
+    }
+  }
+  *free = all;
+  *nothing = none;
 }
 
 std::uint64_t free_voxels(const LookView& view, const VoxelCentres& centres, std::uint64_t asked) {

@@ -16,8 +16,9 @@ struct VoxelCentres {
 
 /// A level of the pyramid over the free ends of the rays.
 struct EndsLevel {
-  const float* nearest = nullptr;  ///< of each cell; readable for eight cells from each
-  int stride = 0;                  ///< cells from row to row
+  const float* nearest = nullptr;   ///< of each cell; readable for eight cells from each
+  const float* farthest = nullptr;  ///< likewise
+  int stride = 0;                   ///< cells from row to row
 };
 
 /// What of a Clearance the kernel needs.
@@ -25,8 +26,10 @@ struct LookView {
   double f_x, f_y, c_x, c_y;  ///< pixels
   int width, height;          ///< pixels
   double range;               ///< m
-  double half[3];             ///< half extents of a voxel along the axes of the camera, m NOLINT(*-avoid-c-arrays)
+  double voxel;               ///< m
+  double reach[3];            ///< half extents of a cube of side 1 along the axes of the camera NOLINT(*-avoid-c-arrays)
   double sides[4][3];         ///< inward normals of the viewing frustum NOLINT(*-avoid-c-arrays)
+  double side_reach[4];       ///< half extents of a cube of side 1 along them NOLINT(*-avoid-c-arrays)
   const EndsLevel* levels;
   int level_count;
 };
@@ -62,6 +65,10 @@ PADE_DECLARE_KERNEL(
     /// `corners`: centres of the eight eighths, x, y, z; `offsets`: from them to their eight voxels, eight x, y, z.
     void place_voxels(const double* corners, const double* offsets, VoxelCentres& out);
     void move_voxels(const LookMotion& motion, const VoxelCentres& from, VoxelCentres& out);
+    void move_corners(const LookMotion& motion, const double* from, double* out);
+    /// Of eight cubes of 2 x 2 x 2 voxels, by `corners`, one bit each: those that are free all over, and those of which
+    /// nothing is.
+    void look_at_eight(const LookView& view, const double* corners, unsigned* free, unsigned* nothing);
     /// Of `asked`, bit by voxel, those that are free.
     std::uint64_t free_voxels(const LookView& view, const VoxelCentres& centres, std::uint64_t asked);
     /// Z - margin_sigmas sigma of a row, from 0 to the range; NaN where nothing was measured (state 0) or sigma is not
