@@ -29,6 +29,7 @@ set(pade_public_headers
   depth/derotation.hpp
   depth/edges.hpp
   depth/focus_of_expansion.hpp
+  depth/image/footing.hpp
   depth/motion/baseline_window.hpp
   depth/motion/motion_alignment.hpp
   depth/motion/motion_refinement.hpp

@@ -16,6 +16,7 @@
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
+#include "pade/pipeline/depth_from.hpp"
 #include "pade/pipeline/map_sequence.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
 
@@ -24,37 +25,7 @@
 #include "progress.hpp"
 
 namespace pade::cli {
-
-/// Which frames a depth image is made from, and how.
-enum class DepthFrom { multi_view, two_view, pade, ttc };
-
-}  // namespace pade::cli
-
-template <>
-struct pade::EnumNames<pade::cli::DepthFrom> {
-  static constexpr std::array names = {
-      std::pair{pade::cli::DepthFrom::multi_view, std::string_view("multi-view")},
-      std::pair{pade::cli::DepthFrom::two_view, std::string_view("two-view")},
-      std::pair{pade::cli::DepthFrom::pade, std::string_view("pade")},
-      std::pair{pade::cli::DepthFrom::ttc, std::string_view("ttc")}};
-};
-
-namespace pade::cli {
 namespace {
-
-void choose_depth(DepthFrom from, ObstacleMapperOptions& mapper) {
-  switch (from) {
-    case DepthFrom::multi_view:
-      return;
-    case DepthFrom::two_view:
-      mapper.views.count = 0;
-      return;
-    case DepthFrom::pade:
-    case DepthFrom::ttc:
-      mapper = one_pair(mapper);
-      mapper.depth.method = from == DepthFrom::ttc ? depth::Method::ttc : depth::Method::pade;
-  }
-}
 
 struct MapArguments {
   std::string sequence;

@@ -24,8 +24,10 @@ class Progress {
   }
 
   /// One more of the total is done. `note` is appended as it is.
-  void step(const std::string& note = {}) {
-    ++done_;
+  void step(const std::string& note = {}) { show(done_ + 1, note); }
+  /// So many are done.
+  void show(std::size_t done, const std::string& note) {
+    done_ = done;
     const auto now = Clock::now();
     if (!visible_) {
       if (now - last_ < std::chrono::seconds(25)) return;

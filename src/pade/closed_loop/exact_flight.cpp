@@ -17,20 +17,6 @@ namespace {
 using Eigen::Vector3d;
 using planning::MotionState;
 constexpr double kSampleRate = 100;  // Hz, of the look at the true surface
-constexpr double kFarthest = 2;      // clearances are measured up to here, m
-constexpr double kStanding = 0.05;   // m/s
-constexpr double kMoving = 0.3;      // m/s
-constexpr double kNearStart = 10;    // farther away no plan looks at the place of take-off, m
-
-Camera camera_of(int width) {
-  Camera camera;
-  camera.width = width;
-  camera.height = width * 3 / 4;
-  camera.fx = camera.fy = 554.26 * width / 640;
-  camera.cx = 0.5 * (camera.width - 1);
-  camera.cy = 0.5 * (camera.height - 1);
-  return camera;
-}
 
 Pose camera_at(const MotionState& state) {
   const Pose body{Eigen::Quaterniond(Eigen::AngleAxisd(state.yaw, Vector3d::UnitZ())), state.position};
@@ -58,17 +44,18 @@ DepthImage depth_image(const cv::Mat& exact, double time) {
 }
 
 /// One flight while it goes on.
-class Loop {
+class ExactLoop {
  public:
-  Loop(const FlightTask& task, const ExactFlightOptions& options, planning::LocalPlanner planner,
-       mapping::OccupancyMap map)
+  ExactLoop(const FlightTask& task, const ExactFlightOptions& options, planning::LocalPlanner planner,
+            mapping::OccupancyMap map)
       : task_(task),
         options_(options),
         planner_(std::move(planner)),
         map_(std::move(map)),
         view_(mapping::MapView::of(map_)),
-        camera_(camera_of(options.width)),
-        grid_(camera_) {
+        camera_(forward_camera(options.width)),
+        grid_(camera_),
+        watch_(task, options.planner.vehicle.radius) {
     const Vector3d way = task.goal - task.start;
     MotionState rest;
     rest.position = task.start;
@@ -82,7 +69,6 @@ class Loop {
   void see(double time);
   std::vector<MotionState> decide(double time, double effect);
   bool advance(double from, double to);
-  void finish(double time);
 
   const FlightTask& task_;
   const ExactFlightOptions& options_;
@@ -93,68 +79,40 @@ class Loop {
   Camera camera_;
   simulation::RayGrid grid_;
   std::vector<MotionState> motion_;
-  bool moving_ = false;
-  FlightRecord record_;
+  FlightWatch watch_;
 };
 
-void Loop::see(double time) {
+void ExactLoop::see(double time) {
   const Pose pose = camera_at(planning::state_at(motion_, time));
   const mapping::MapChange change =
       map_.integrate(depth_image(simulation::exact_depth(task_.scene, grid_, pose), time), camera_, pose);
   view_ = view_->after(map_, change);
 }
 
-std::vector<MotionState> Loop::decide(double time, double effect) {
+std::vector<MotionState> ExactLoop::decide(double time, double effect) {
   const MotionState then = planning::state_at(motion_, effect);
   const std::array start = {task_.start};
-  const bool near_start = (then.position - task_.start).norm() < options_.known_start + kNearStart;
+  const bool near_start = (then.position - task_.start).norm() < options_.known_start + kStartInSight;
   const auto known =
       near_start && options_.known_start > 0 ? view_->flown(start, options_.known_start) : view_;
   window_.set(*known, then.position, planner_.radius(0));
   const planning::MapSpace space(known);
   const planning::LocalPlan& plan = planner_.plan(then, task_.goal, space, window_);
-  record_.plans.push_back({time, plan.kind, plan.speed_limit, plan.free_reach, plan.valid});
+  watch_.add({time, plan.kind, plan.speed_limit, plan.free_reach, plan.valid});
   return plan.motion;
 }
 
 /// False if it ends here.
-bool Loop::advance(double from, double to) {
+bool ExactLoop::advance(double from, double to) {
   const int samples = static_cast<int>(std::lround((to - from) * kSampleRate));
   for (int i = 1; i <= samples; ++i) {
-    const double time = from + i / kSampleRate;
-    const MotionState state = planning::state_at(motion_, time);
-    const double clearance =
-        task_.surface.inside(state.position) ? 0 : task_.surface.to(state.position, kFarthest);
-    if (!record_.samples.empty())
-      record_.length += (state.position - record_.samples.back().state.position).norm();
-    record_.samples.push_back({state, clearance});
-    const double speed = state.velocity.norm();
-    if (moving_ && speed < kStanding) ++record_.stops;
-    moving_ = speed > kMoving || (moving_ && speed >= kStanding);
-    if (clearance < options_.planner.vehicle.radius) {
-      record_.outcome = Outcome::collided;
-      return false;
-    }
-    if ((state.position - task_.goal).head<2>().norm() < options_.planner.arrival) {
-      record_.outcome = Outcome::arrived;
-      return false;
-    }
+    if (!watch_.look(planning::state_at(motion_, from + i / kSampleRate))) return false;
+    if (watch_.goal_distance() < options_.planner.arrival) return false;
   }
   return true;
 }
 
-void Loop::finish(double time) {
-  record_.duration = record_.samples.empty() ? time : record_.samples.back().state.time;
-  record_.least_clearance = kFarthest;
-  for (const FlightSample& sample : record_.samples)
-    record_.least_clearance = std::min(record_.least_clearance, sample.clearance);
-  if (record_.samples.empty()) return;
-  const double made_good =
-      (task_.goal - task_.start).norm() - (task_.goal - record_.samples.back().state.position).norm();
-  record_.goal_velocity = made_good / record_.duration;
-}
-
-FlightRecord Loop::run() {
+FlightRecord ExactLoop::run() {
   const double period = 1 / options_.frame_rate;
   double time = 0;
   for (int frame = 0; time < options_.time_limit; ++frame) {
@@ -164,8 +122,8 @@ FlightRecord Loop::run() {
     if (!advance(time, time + period)) break;
     motion_ = std::move(next);
   }
-  finish(time);
-  return std::move(record_);
+  const bool there = watch_.goal_distance() < options_.planner.arrival;
+  return watch_.finished(there ? Outcome::arrived : Outcome::timed_out);
 }
 
 }  // namespace
@@ -188,7 +146,7 @@ Result<FlightRecord> fly_exact(const FlightTask& task, const ExactFlightOptions&
   if (!planner) return Error{"planner: " + planner.error().message};
   auto map = mapping::OccupancyMap::create(options.map);
   if (!map) return map.error();
-  return Loop(task, options, std::move(planner).value(), std::move(map).value()).run();
+  return ExactLoop(task, options, std::move(planner).value(), std::move(map).value()).run();
 }
 
 }  // namespace pade::closed_loop

@@ -92,7 +92,17 @@ bool many_views(const ObstacleMapperOptions& o) {
 }
 
 constexpr double kScaleDrift = 1e-5;  // variance of the logarithm, from frame to frame
-constexpr int kGuidedLevel = 1;       // flow over the longer baseline starts near its end
+constexpr double kLengthGate = 16;    // four sigmas
+
+/// What an alignment says of the length of the step.
+std::optional<depth::BaselineWindow::Seen> length_seen(const depth::AlignedMotion& aligned, int steps) {
+  const Eigen::Vector3d& t = aligned.motion.t_reference_other;
+  const double squared = t.squaredNorm();
+  if (!aligned.aligned || !(squared > 0)) return std::nullopt;
+  const double along = t.dot(aligned.motion.covariance.topLeftCorner<3, 3>() * t) / squared;
+  return depth::BaselineWindow::Seen{std::sqrt(squared), along / squared + kScaleDrift, steps};
+}
+constexpr int kGuidedLevel = 1;  // flow over the longer baseline starts near its end
 
 }  // namespace
 
@@ -108,6 +118,7 @@ Status check(const ObstacleMapperOptions& o) {
   if (Status status = within("alignment", check(o.alignment)); !status) return status;
   if (Status status = within("depth", check(o.depth)); !status) return status;
   if (Status status = within("edges", check(o.edges)); !status) return status;
+  if (Status status = within("footing", check(o.footing)); !status) return status;
   if (Status status = within("views", check(o.views)); !status) return status;
   return within("map", check(o.map));
 }
@@ -273,6 +284,10 @@ void ObstacleMapper::map_frame(TrackedFrame& newest) {
     const Stopwatch watch(update_, Stage::depth);
     depth::guard_edges(update_.depth, options_.edges);
     if (options_.outlines) depth::bound_by_outlines(update_.depth);
+    if (options_.footing.on) {
+      const Eigen::Vector3d up = reference.T_world_camera.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+      depth::bound_by_footing(update_.depth, camera_, up, options_.footing);
+    }
   }
   update_.depth.time = reference.time;
   update_.reference = reference;
@@ -344,7 +359,13 @@ void ObstacleMapper::refine_by_depth(const RelativeMotion& given, Pair& pair, co
     baselines_.clear();
     return;
   }
-  const depth::AlignedMotion aligned = align(pair, newest);
+  depth::AlignedMotion aligned = align(pair, newest);
+  std::optional<depth::BaselineWindow::Seen> seen = length_seen(aligned, update_.step);
+  if (seen &&
+      baselines_.surprise(given, aligned.motion.t_reference_other.normalized(), *seen) > kLengthGate) {
+    aligned = {pair.motion};  // neither GPS/INS nor the steps before agree: the images were laid over wrongly
+    seen.reset();
+  }
   RelativeMotion motion = aligned.motion;
   const double length = motion.t_reference_other.norm();
   if (!(length > 0)) {
@@ -354,8 +375,6 @@ void ObstacleMapper::refine_by_depth(const RelativeMotion& given, Pair& pair, co
   const Eigen::Vector3d direction = motion.t_reference_other / length;
   Eigen::Matrix3d covariance = motion.covariance.topLeftCorner<3, 3>();
   const double along = direction.dot(covariance * direction);
-  std::optional<depth::BaselineWindow::Seen> seen;
-  if (aligned.aligned) seen = {length, along / (length * length) + kScaleDrift, update_.step};
   const double longer = recent_.stretch(baselines_.push(given, direction, seen), update_.step);
   if (!found_.empty()) found_.rho *= 1 / longer;
   motion.t_reference_other = baselines_.length() * direction;

@@ -22,6 +22,7 @@
 #include "pade/depth/depth_estimator.hpp"
 #include "pade/depth/depth_options.hpp"
 #include "pade/depth/edges.hpp"
+#include "pade/depth/image/footing.hpp"
 #include "pade/depth/motion/baseline_window.hpp"
 #include "pade/depth/motion/motion_alignment.hpp"
 #include "pade/depth/motion/motion_refinement.hpp"
@@ -73,6 +74,7 @@ struct ObstacleMapperOptions {
   depth::DepthOptions depth = depth::chain_options();
   depth::EdgeOptions edges;
   bool outlines = true;
+  depth::FootingOptions footing;
   ViewsOptions views;
   mapping::MapOptions map;
 
@@ -95,6 +97,7 @@ struct ObstacleMapperOptions {
     field("alignment", self.alignment, "motion refined by the depth of the last frame");
     field("edges", self.edges, "depth at edges");
     field("outlines", self.outlines, "patches without texture are bounded by what their outlines show");
+    field("footing", self.footing, "patches without texture are bounded by what they stand on");
     field("depth", self.depth, "depth from motion");
     field("views", self.views, "depth from several views");
     field("map", self.map, "occupancy map");

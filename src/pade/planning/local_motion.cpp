@@ -26,7 +26,7 @@ MotionState stepped(const MotionState& from, const MotionCommand& command, bool 
   if (!braking) to.yaw = wrapped(from.yaw + step * command.yaw_rate);
   const Vector3d asked = braking ? Vector3d(Vector3d::Zero()) : asked_velocity(command, to.yaw, to.time);
   const Vector3d change = asked - from.velocity;
-  const double most = limits.acceleration * step;
+  const double most = (braking ? limits.acceleration : limits.pick_up) * step;
   const double size = change.norm();
   to.velocity = size <= most ? asked : Vector3d(from.velocity + most / size * change);
   to.position += 0.5 * step * (from.velocity + to.velocity);

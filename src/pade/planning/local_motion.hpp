@@ -29,7 +29,7 @@ struct MotionCommand {
 };
 
 /// The motion under a command that ends in a stop: the velocity turns into the one asked for as fast as the
-/// acceleration allows; the yaw rate is there at once.
+/// pick-up allows, and ends as fast as the acceleration does; the yaw rate is there at once.
 /// @param hold  seconds for which the command holds; then the vehicle brakes
 /// @param step  between the states, s
 /// @param out   emptied, then filled from `from` to the standstill

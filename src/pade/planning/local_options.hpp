@@ -8,10 +8,11 @@ namespace pade::planning {
 
 /// The vehicle as the planner knows it.
 struct VehicleLimits {
-  double radius = 0.35;       ///< of the ball that holds it, m
-  double speed = 2;           ///< m/s
-  double acceleration = 3;    ///< of speeding up, turning and braking, m/s^2
-  double latency = 0.35;      ///< from the moment of an image until what it shows changes the motion, s
+  double radius = 0.35;     ///< of the ball that holds it, m
+  double speed = 2;         ///< m/s
+  double acceleration = 3;  ///< of braking, m/s^2
+  double pick_up = 2;     ///< of speeding up and turning, m/s^2: the less the vehicle tilts, the more it sees
+  double latency = 0.35;  ///< from the moment of an image until what it shows changes the motion, s
   double nose_angle = 0.262;  ///< the velocity is never farther from the nose than this, rad
   double lowest = 0.7;        ///< height of its centre in the world, m
   double highest = 2.8;       ///< and the greatest, m
@@ -20,7 +21,8 @@ struct VehicleLimits {
   static void visit(Self& self, Visitor&& field) {
     field("radius", self.radius, "of the ball that holds the vehicle, m");
     field("speed", self.speed, "greatest speed, m/s");
-    field("acceleration", self.acceleration, "of speeding up, turning and braking, m/s^2");
+    field("acceleration", self.acceleration, "of braking, m/s^2");
+    field("pick_up", self.pick_up, "of speeding up and turning, m/s^2");
     field("latency", self.latency, "from an image until what it shows changes the motion, s");
     field("nose_angle", self.nose_angle, "the velocity is never farther from the nose than this, rad");
     field("lowest", self.lowest, "least height of its centre in the world, m");

@@ -16,6 +16,8 @@ constexpr std::array kClimbs = {0.0, 0.5, -0.5};  // m/s
 constexpr double kSwing = 0.13;                   // m
 constexpr double kSwingRoom = 0.2;                // to each side, m
 constexpr double kPatience = 0.6;                 // s of standing before a hop
+constexpr double kPatienceInFlight = 1.5;         // s without progress
+constexpr double kProgress = 0.3;                 // m
 constexpr double kHopSpeed = 0.4;                 // m/s
 constexpr double kStanding = 0.05;                // m/s
 constexpr double kCrawl = 0.25;                   // slower motion may have any direction, m/s
@@ -144,7 +146,46 @@ bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command) {
   plan_.kind = PlanKind::recovering;
   plan_.command = command;
   plan_.motion.swap(candidate_);
+  hop_ends_ = plan_.motion.back().time;
   standing_since_ = -1;
+  return true;
+}
+
+/// To the sides, back, up or down, wherever it is known to be free, to see past what hides the way: a mono
+/// camera that stands, or only turns, sees no depth, and ahead of one that creeps straight on lies its
+/// epipole.
+bool LocalPlanner::hop(const Task& task) {
+  constexpr std::array<std::array<double, 3>, 5> kWays = {
+      {{0, 1, 0}, {0, -1, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}}};
+  for (std::size_t i = 0; i < kWays.size(); ++i) {
+    const auto& way = kWays[(static_cast<std::size_t>(hops_) + i) % kWays.size()];
+    if (try_hop(task, {kHopSpeed * way[0], kHopSpeed * way[1], kHopSpeed * way[2], 0, 0})) {
+      hops_ += static_cast<int>(i) + 1;
+      return true;
+    }
+  }
+  return false;
+}
+
+/// A hop is flown to its end, as long as it is free.
+bool LocalPlanner::goes_on_hopping(const Task& task) {
+  if (task.from.time >= hop_ends_ - 1e-6) return false;
+  commit(task);
+  plan_.kind = PlanKind::recovering;
+  since_ = task.from.time;
+  return true;
+}
+
+/// For a while neither motion nor what was seen has brought the goal nearer.
+bool LocalPlanner::gets_nowhere(const Task& task) {
+  const double to_go = guide_.to_go(task.from.position);
+  if (least_to_go_ < 0 || to_go < least_to_go_ - kProgress) {
+    least_to_go_ = to_go;
+    since_ = task.from.time;
+  }
+  if (task.from.time - since_ < kPatienceInFlight) return false;
+  least_to_go_ = to_go;
+  since_ = task.from.time;
   return true;
 }
 
@@ -164,15 +205,7 @@ void LocalPlanner::recover(const Task& task) {
   }
   if (standing_since_ < 0) standing_since_ = task.from.time;
   if (task.from.time - standing_since_ < kPatience) return;
-  constexpr std::array<std::array<double, 3>, 5> kWays = {
-      {{0, 1, 0}, {0, -1, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}}};
-  for (std::size_t i = 0; i < kWays.size(); ++i) {
-    const auto& way = kWays[(static_cast<std::size_t>(hops_) + i) % kWays.size()];
-    if (try_hop(task, {kHopSpeed * way[0], kHopSpeed * way[1], kHopSpeed * way[2], 0, 0})) {
-      hops_ += static_cast<int>(i) + 1;
-      return;
-    }
-  }
+  hop(task);
 }
 
 const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& goal, const FreeSpace& space,
@@ -193,6 +226,8 @@ const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& goa
     return plan_;
   }
   guide_.set(window, goal, {options_.vehicle.lowest, options_.vehicle.highest});
+  const bool stuck = gets_nowhere(task);
+  if (goes_on_hopping(task)) return plan_;
   plan_.kind = PlanKind::committed;
   plan_.peering = options_.peering && is_blind_ahead(task);
   choose_primitive(task);
@@ -200,9 +235,10 @@ const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& goa
     plan_.peering = false;
     commit(task);
     if (from.velocity.norm() < kStanding) recover(task);
-  } else {
-    standing_since_ = -1;
+    return plan_;
   }
+  standing_since_ = -1;
+  if (stuck && from.velocity.norm() < kCrawl) hop(task);
   return plan_;
 }
 

@@ -20,7 +20,7 @@ namespace pade::planning {
 enum class PlanKind {
   flying,      ///< one of the primitives is valid
   committed,   ///< none is: the stop that was found free before is flown to its end
-  recovering,  ///< it stands, and turns or hops to see more
+  recovering,  ///< it stands or gets nowhere, and turns or hops to see more
   arrived,     ///< it is at the goal, and stops
 };
 
@@ -74,6 +74,9 @@ class LocalPlanner {
   void recover(const Task& task);
   [[nodiscard]] double best_heading(const Task& task) const;
   bool try_hop(const Task& task, const MotionCommand& command);
+  bool hop(const Task& task);
+  bool goes_on_hopping(const Task& task);
+  [[nodiscard]] bool gets_nowhere(const Task& task);
 
   LocalPlannerOptions options_;
   LocalGuide guide_;
@@ -82,6 +85,9 @@ class LocalPlanner {
   std::vector<Eigen::Vector3d> path_;
   double standing_since_ = -1;  // s; negative = it moves
   int hops_ = 0;
+  double hop_ends_ = -1;     // s; of the hop that is being flown
+  double least_to_go_ = -1;  // the shortest way that was left so far, m; negative = not known
+  double since_ = 0;         // when that was, s
 };
 
 }  // namespace pade::planning

@@ -73,9 +73,12 @@ TEST(Vehicle, ItsStateFitsItsAccelerations) {
     s.velocity = {std::sin(0.01 * i), std::cos(0.013 * i), 0.2};
     s.position = vehicle.state().position;
     s.yaw = 0.002 * i;
-    vehicle.fly(s, vehicle.state(), {0.5, 0, 0}, kStep);
-    velocity += kStep * vehicle.state().acceleration;
-    attitude = attitude * rotation_exp(kStep * vehicle.state().angular_velocity);
+    const KinematicState before = vehicle.state();
+    vehicle.fly(s, before, {0.5, 0, 0}, kStep);
+    velocity += 0.5 * kStep * (before.acceleration + vehicle.state().acceleration);
+    attitude =
+        attitude * rotation_exp(0.5 * kStep * (before.angular_velocity + vehicle.state().angular_velocity));
+    EXPECT_LT((vehicle.state().angular_velocity - before.angular_velocity).norm(), 1.1);  // no jumps
   }
   EXPECT_LT((velocity - vehicle.state().velocity).norm(), 1e-9);
   EXPECT_LT(attitude.angularDistance(vehicle.state().R_world_body), 1e-9);

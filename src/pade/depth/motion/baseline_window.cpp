@@ -52,6 +52,20 @@ void BaselineWindow::drop_oldest() {
   for (Eigen::VectorXd* values : {&x_, &given_, &variances_}) *values = Eigen::VectorXd(values->tail(n));
 }
 
+double BaselineWindow::surprise(const RelativeMotion& given, const Eigen::Vector3d& direction,
+                                const Seen& seen) const {
+  const Eigen::Index n = x_.size();
+  if (n == 0) return 0;
+  const Given measured = given_along(given, direction);
+  const Eigen::Index span = std::clamp<Eigen::Index>(seen.steps, 1, n);
+  Eigen::VectorXd share = Eigen::VectorXd::Zero(n);
+  share.tail(span) = x_.tail(span).array().exp();
+  share /= share.sum();
+  const double difference = std::log(seen.length) - measured.log_length;
+  const double variance = measured.variance + seen.variance + share.dot(information_.ldlt().solve(share));
+  return difference * difference / variance;
+}
+
 std::vector<double> BaselineWindow::push(const RelativeMotion& given, const Eigen::Vector3d& direction,
                                          const std::optional<Seen>& seen) {
   if (x_.size() == most_) drop_oldest();

@@ -29,6 +29,10 @@ class BaselineWindow {
     double variance;  ///< of its logarithm, > 0
     int steps;        ///< just before this one, whose sum is the baseline of the depth; at least 1
   };
+  /// How far what the images say of a step is from what GPS/INS says of it and of those before: the square of
+  /// the difference of the logarithms over its variance. Zero where there is nothing to compare.
+  [[nodiscard]] double surprise(const RelativeMotion& given, const Eigen::Vector3d& direction,
+                                const Seen& seen) const;
   /// Takes a step in.
   /// @param given  its motion by GPS/INS, with covariance. @param direction  of its translation, of length 1,
   /// as the images have it. @param seen  empty = nothing

@@ -28,11 +28,21 @@ Occupancy column(const mapping::MapView& view, double x, double y, double low, d
   return state;
 }
 
-std::string points_of(std::span<const Vector3d> line, const AlignedBox3d& box) {
+std::string points_of(std::span<const Vector3d> line, const AlignedBox3d& box, char separator = ' ') {
   std::string text;
   for (const Vector3d& p : line)
-    text += fmt::format("{:.3f},{:.3f} ", p.x() - box.min().x(), box.max().y() - p.y());
+    text += fmt::format("{:.3f},{:.3f}{}", p.x() - box.min().x(), box.max().y() - p.y(), separator);
+  if (!text.empty()) text.pop_back();
   return text;
+}
+
+/// The ball, on its way.
+std::string moving_ball(std::span<const Vector3d> line, const AlignedBox3d& box, double radius,
+                        double seconds) {
+  return fmt::format(
+      "<circle r='{:.3f}' fill='#1b6ac9' fill-opacity='0.7'><animateMotion dur='{:.1f}s' calcMode='linear' "
+      "repeatCount='indefinite' values='{}'/></circle>\n",
+      radius, seconds, points_of(line, box, ';'));
 }
 
 /// One rectangle for each run of cells of a state in a row.
@@ -63,7 +73,7 @@ std::string cells(const mapping::MapView& view, const AlignedBox3d& box, double 
 }  // namespace
 
 std::string route_picture(const mapping::MapView& view, std::span<const Vector3d> points,
-                          std::span<const Vector3d> corners, double radius) {
+                          std::span<const Vector3d> corners, double radius, double seconds) {
   AlignedBox3d box;
   for (const Vector3d& p : points) box.extend(p);
   const Vector3d around(kAround, kAround, radius);
@@ -86,9 +96,10 @@ std::string route_picture(const mapping::MapView& view, std::span<const Vector3d
   svg +=
       fmt::format("<polyline points='{}' stroke='#c96a1b' stroke-dasharray='0.3' stroke-width='{:.3f}'/>\n",
                   points_of(corners, box), 2 / scale);
-  svg += fmt::format("<polyline points='{}' stroke='#1b6ac9' stroke-width='{:.3f}'/>\n</svg>\n",
+  svg += fmt::format("<polyline points='{}' stroke='#1b6ac9' stroke-width='{:.3f}'/>\n",
                      points_of(points, box), 3 / scale);
-  return svg;
+  if (seconds > 0) svg += moving_ball(points, box, radius, seconds);
+  return svg + "</svg>\n";
 }
 
 }  // namespace pade::evaluation

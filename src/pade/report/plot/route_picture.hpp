@@ -15,7 +15,9 @@ namespace pade::evaluation {
 /// @param points   of the motion, world, m; at least one
 /// @param corners  of the straight lines behind it, world, m
 /// @param radius   of the ball, m
+/// @param seconds  in which the ball moves along the points, which are equally far apart in time, again and
+///                 again; 0 = it does not move
 std::string route_picture(const mapping::MapView& view, std::span<const Eigen::Vector3d> points,
-                          std::span<const Eigen::Vector3d> corners, double radius);
+                          std::span<const Eigen::Vector3d> corners, double radius, double seconds = 0);
 
 }  // namespace pade::evaluation

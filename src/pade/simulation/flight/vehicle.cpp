@@ -30,15 +30,16 @@ Vector3d shortened(const Vector3d& v, double most) {
 }  // namespace
 
 Status check(const VehicleModel& model) {
-  const std::array<OptionRange, 9> ranges = {{{"attitude_lag", model.attitude_lag, 0.01, 10},
-                                              {"thrust_lag", model.thrust_lag, 0.01, 10},
-                                              {"drag", model.drag, 0, 10},
-                                              {"tilt", model.tilt, 0.05, 1.2},
-                                              {"turn_rate", model.turn_rate, 0.1, 50},
-                                              {"thrust", model.thrust, model.gravity, 500},
-                                              {"position_gain", model.position_gain, 0, 20},
-                                              {"velocity_gain", model.velocity_gain, 0, 20},
-                                              {"gravity", model.gravity, above_zero, 100}}};
+  const std::array<OptionRange, 10> ranges = {{{"attitude_lag", model.attitude_lag, 0.01, 10},
+                                               {"rate_lag", model.rate_lag, 0.005, 10},
+                                               {"thrust_lag", model.thrust_lag, 0.01, 10},
+                                               {"drag", model.drag, 0, 10},
+                                               {"tilt", model.tilt, 0.05, 1.2},
+                                               {"turn_rate", model.turn_rate, 0.1, 50},
+                                               {"thrust", model.thrust, model.gravity, 500},
+                                               {"position_gain", model.position_gain, 0, 20},
+                                               {"velocity_gain", model.velocity_gain, 0, 20},
+                                               {"gravity", model.gravity, above_zero, 100}}};
   return check_ranges(ranges);
 }
 
@@ -65,14 +66,20 @@ void Vehicle::fly(const Setpoint& setpoint, const KinematicState& believed, cons
                   double step) {
   const Vector3d asked = asked_thrust(setpoint, believed);
   const Eigen::Quaterniond error = state_.R_world_body.conjugate() * attitude_of(asked, setpoint.yaw);
-  state_.angular_velocity = shortened(rotation_log(error) / model_.attitude_lag, model_.turn_rate);
-  const double share = 1 - std::exp(-step / model_.thrust_lag);
-  thrust_ += share * (std::clamp(asked.norm(), 0.0, model_.thrust) - thrust_);
+  const KinematicState before = state_;
+  const auto share = [step](double lag) { return 1 - std::exp(-step / lag); };
+  const Vector3d rate = shortened(rotation_log(error) / model_.attitude_lag, model_.turn_rate);
+  state_.angular_velocity += share(model_.rate_lag) * (rate - before.angular_velocity);
+  // Rates and accelerations are those of the moment, as instruments see them; between two moments they are
+  // linear.
+  const Vector3d turn = 0.5 * step * (before.angular_velocity + state_.angular_velocity);
+  state_.R_world_body = (before.R_world_body * rotation_exp(turn)).normalized();
+  thrust_ += share(model_.thrust_lag) * (std::clamp(asked.norm(), 0.0, model_.thrust) - thrust_);
   state_.acceleration = thrust_ * (state_.R_world_body * Vector3d::UnitZ()) -
-                        model_.gravity * Vector3d::UnitZ() - model_.drag * (state_.velocity - wind);
-  state_.position += step * state_.velocity + 0.5 * step * step * state_.acceleration;
-  state_.velocity += step * state_.acceleration;
-  state_.R_world_body = (state_.R_world_body * rotation_exp(step * state_.angular_velocity)).normalized();
+                        model_.gravity * Vector3d::UnitZ() - model_.drag * (before.velocity - wind);
+  state_.velocity += 0.5 * step * (before.acceleration + state_.acceleration);
+  state_.position +=
+      step * before.velocity + step * step * (before.acceleration / 3 + state_.acceleration / 6);
   state_.time = Time{state_.time.nanoseconds + std::llround(step * 1e9)};
 }
 

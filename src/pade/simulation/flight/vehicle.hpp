@@ -13,6 +13,7 @@ namespace pade::simulation {
 
 struct VehicleModel {
   double attitude_lag = 0.12;  ///< time constant of the attitude, s
+  double rate_lag = 0.04;      ///< of the angular rate, s
   double thrust_lag = 0.05;    ///< of the thrust, s
   double drag = 0.3;           ///< deceleration over speed through the air, 1/s
   double tilt = 0.6;           ///< greatest that is commanded, rad
@@ -25,6 +26,7 @@ struct VehicleModel {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("attitude_lag", self.attitude_lag, "time constant of the attitude, s");
+    field("rate_lag", self.rate_lag, "time constant of the angular rate, s");
     field("thrust_lag", self.thrust_lag, "time constant of the thrust, s");
     field("drag", self.drag, "deceleration over speed through the air, 1/s");
     field("tilt", self.tilt, "greatest tilt that is commanded, rad");
@@ -53,7 +55,7 @@ class Vehicle {
   /// Hovers at a place. `model` as check() accepts it.
   Vehicle(const VehicleModel& model, const Eigen::Vector3d& position, double yaw);
 
-  /// The true state; its acceleration and angular velocity are those of the last step.
+  /// The true state; its acceleration and angular velocity are those of this moment.
   [[nodiscard]] const KinematicState& state() const { return state_; }
 
   /// Flies `step` seconds (some milliseconds) toward a setpoint.

@@ -1,0 +1,364 @@
+#include "pade/closed_loop/chain_flight.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "pade/core/option_check.hpp"
+#include "pade/planning/local_window.hpp"
+#include "pade/planning/map_space.hpp"
+#include "pade/simulation/flight/frame_maker.hpp"
+
+namespace pade::closed_loop {
+namespace {
+
+using Eigen::Vector3d;
+using planning::MotionState;
+using simulation::KinematicState;
+constexpr double kLongestStand = 60;  // s
+constexpr double kLookAhead = 0.02;   // s, over which a plan's acceleration is read
+constexpr double kClimbSpeed = 0.6;   // m/s
+constexpr double kAtTheGoal = 5;      // m from the true goal: what single-point GNSS can promise
+constexpr double kLost = 0.4;         // m from the plan: then it is made anew from where the vehicle is
+
+double processor_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+Pose body_pose(const KinematicState& state) { return {state.R_world_body, state.position}; }
+
+MotionState level(const KinematicState& state, double time) {
+  return {time, state.position, state.velocity, yaw_of(state.R_world_body)};
+}
+
+/// Straight on at constant velocity and turn.
+KinematicState moved(const KinematicState& state, double seconds) {
+  KinematicState out = state;
+  out.position += seconds * state.velocity;
+  out.R_world_body = state.R_world_body * rotation_exp(seconds * state.angular_velocity);
+  return out;
+}
+
+simulation::FrameOptions frame_options(const ChainFlightOptions& options, std::uint64_t seed) {
+  constexpr double kBlur = 0.01;  // s
+  simulation::FrameOptions frame;
+  frame.image = options.image;
+  frame.exposure_time = options.fault.kind == Fault::motion_blur ? kBlur : options.exposure_time;
+  frame.seed = seed;
+  return frame;
+}
+
+planning::LocalPlannerOptions with_heights_about(planning::LocalPlannerOptions options, double start,
+                                                 double map) {
+  options.vehicle.lowest += map - start;
+  options.vehicle.highest += map - start;
+  return options;
+}
+
+/// One flight while it goes on.
+class ChainLoop {
+ public:
+  ChainLoop(const FlightTask& task, const ChainFlightOptions& options, ObstacleMapper mapper, double yaw)
+      : task_(task),
+        options_(options),
+        camera_(forward_camera(options.width)),
+        T_body_camera_{Eigen::Quaterniond(forward_camera_rotation()), Vector3d::Zero()},
+        vehicle_(options.vehicle, options.fault, task.start - options.climb * Vector3d::UnitZ(), yaw,
+                 task.seed),
+        mapper_(std::move(mapper)),
+        view_(mapping::MapView::of(mapper_.map())),
+        maker_(task.scene, camera_, frame_options(options, task.seed)),
+        watch_(task, options.planner.vehicle.radius) {}
+
+  Result<ChainRecord> run(const std::function<bool(const ChainMoment&)>& observer);
+
+ private:
+  [[nodiscard]] double now() const { return vehicle_.truth().time.seconds() - take_off_; }
+  bool get_ready();
+  bool take_off();
+  void frame();
+  [[nodiscard]] cv::Mat picture(Time& stamp);
+  void look(const cv::Mat& image, Time stamp);
+  bool place(Time stamp, Pose& pose, Matrix6d& covariance);
+  void anchor(Time stamp);
+  [[nodiscard]] MotionState start_of_plan(double effect) const;
+  std::vector<MotionState> decide(double effect);
+  bool fly_until(int tick);
+  void say(const std::string& what) { record_.events.push_back(fmt::format("{:.1f} s: {}", now(), what)); }
+
+  const FlightTask& task_;
+  const ChainFlightOptions& options_;
+  Camera camera_;
+  Pose T_body_camera_;
+  NavigatedVehicle vehicle_;
+  ObstacleMapper mapper_;
+  std::shared_ptr<const mapping::MapView> view_;
+  simulation::FrameMaker maker_;
+  FlightWatch watch_;
+  std::optional<planning::LocalPlanner> planner_;
+  planning::LocalWindow window_;
+
+  double take_off_ = 0;    // s of the simulation
+  std::int64_t tick_ = 0;  // steps since take-off
+  Pose T_map_smooth_, T_map_world_;
+  double climbed_ = 0;  // s
+  Vector3d ground_ = Vector3d::Zero(), map_start_ = Vector3d::Zero(),
+           goal_ = Vector3d::Zero();           // goal: as navigation has the world
+  std::optional<std::pair<Time, Pose>> last_;  // frame that the mapper has taken
+  Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
+  double last_depth_ = 0;
+  cv::Mat frozen_, image_;
+  const MapperUpdate* update_ = nullptr;
+  std::vector<MotionState> motion_;
+  ChainRecord record_;
+};
+
+/// Stands until the filter knows where it looks.
+bool ChainLoop::get_ready() {
+  while (vehicle_.truth().time.seconds() < kLongestStand) {
+    vehicle_.stand();
+    if (vehicle_.truth().time.seconds() < options_.stand - 1e-9) continue;
+    const auto known = vehicle_.navigator().absolute_pose(vehicle_.truth().time);
+    if (known.answer == navigation::Answer::valid) return true;
+  }
+  return false;
+}
+
+bool ChainLoop::take_off() {
+  if (!get_ready()) return false;
+  take_off_ = vehicle_.truth().time.seconds();
+  const auto known = vehicle_.navigator().absolute_pose(vehicle_.truth().time);
+  T_map_world_ = {};
+  T_map_smooth_ = known.T_world_body * known.T_smooth_body.inverse();
+  ground_ = known.T_world_body.translation;
+  map_start_ = ground_ + options_.climb * Vector3d::UnitZ();
+  goal_ = map_start_ + task_.goal - task_.start;
+  record_.T_world_map = body_pose(vehicle_.truth()) * known.T_world_body.inverse();
+  planner_ =
+      planning::LocalPlanner::create(with_heights_about(options_.planner, task_.start.z(), map_start_.z()))
+          .value();
+  MotionState rest;
+  rest.position = ground_;
+  rest.yaw = yaw_of(known.T_world_body.rotation);
+  planning::foretell(rest, {0, 0, kClimbSpeed, 0, 0}, options_.climb / kClimbSpeed, options_.planner.step,
+                     options_.planner.vehicle, motion_);
+  climbed_ = motion_.back().time;
+  return true;
+}
+
+/// What the camera delivers now, and the stamp that it gives it.
+cv::Mat ChainLoop::picture(Time& stamp) {
+  const FaultOptions& fault = options_.fault;
+  const bool late = fault.kind == Fault::late_stamps;
+  const KinematicState at = vehicle_.truth_before(late ? fault.stamp_error : 0);
+  if (fault.kind == Fault::early_stamps) stamp.nanoseconds -= std::llround(fault.stamp_error * 1e9);
+  if (fault.is_on(Fault::frozen_camera, now()) && !frozen_.empty()) return frozen_;
+  const auto pose_at = [&](double offset) { return body_pose(moved(at, offset)) * T_body_camera_; };
+  simulation::Rendering light = maker_.expose(pose_at(0), pose_at);
+  if (fault.kind == Fault::exposure_jump) {
+    const bool bright = static_cast<int>(std::floor(now())) % 2 == 0;
+    light.radiance *= bright ? 1.4 : 0.7;
+  }
+  frozen_ = maker_.picture(light, at.time);
+  return frozen_;
+}
+
+/// Pose and covariance of a frame, from the last one that the mapper took. False if navigation cannot say.
+bool ChainLoop::place(Time stamp, Pose& pose, Matrix6d& covariance) {
+  if (!last_) {
+    const auto known = vehicle_.navigator().absolute_pose(stamp);
+    pose = T_map_smooth_ * known.T_smooth_body * T_body_camera_;
+    covariance.setZero();
+    return known.answer == navigation::Answer::valid;
+  }
+  const auto step = vehicle_.navigator().relative_pose(last_->first, stamp, T_body_camera_);
+  if (step.answer != navigation::Answer::valid) return false;
+  pose =
+      last_->second * Pose{Eigen::Quaterniond(step.motion.R_reference_other), step.motion.t_reference_other};
+  covariance = step.motion.covariance;
+  return true;
+}
+
+/// Where the filter's worlds lie in the map's, by the frame that the mapper has just placed.
+void ChainLoop::anchor(Time stamp) {
+  const auto known = vehicle_.navigator().absolute_pose(stamp);
+  if (known.answer != navigation::Answer::valid) return;
+  const Pose T_map_body = mapper_.T_world_camera() * T_body_camera_.inverse();
+  T_map_smooth_ = T_map_body * known.T_smooth_body.inverse();
+  T_map_world_ = T_map_body * known.T_world_body.inverse();
+}
+
+void ChainLoop::look(const cv::Mat& image, Time stamp) {
+  ChainFrame& out = record_.frames.back();
+  Pose pose;
+  Matrix6d covariance;
+  if (!place(stamp, pose, covariance)) {
+    out.outcome = MapperUpdate::Outcome::skipped;
+    say("navigation has no pose for the frame");
+    return;
+  }
+  const MapperUpdate& update = mapper_.add(image, stamp, pose, covariance);
+  out.outcome = update.outcome;
+  if (update.outcome == MapperUpdate::Outcome::skipped) {
+    say("frame skipped: " + update.reason);
+    return;
+  }
+  if (last_) {
+    out.given_step = (pose.translation - last_->second.translation).norm();
+    out.step = (mapper_.T_world_camera().translation - placed_).norm();
+  }
+  placed_ = mapper_.T_world_camera().translation;
+  last_ = {stamp, pose};
+  update_ = &update;
+  anchor(stamp);
+  if (update.outcome != MapperUpdate::Outcome::mapped) return;
+  last_depth_ = now();
+  out.views = update.views;
+  out.refined = update.refinement.outcome == depth::RefinementOutcome::refined;
+  view_ = view_->after(mapper_.map(), update.change);
+}
+
+/// Where the vehicle will be when the plan that is made now takes effect.
+MotionState ChainLoop::start_of_plan(double effect) const {
+  MotionState planned = planning::state_at(motion_, effect);
+  if (record_.frames.back().tracking < kLost) return planned;
+  planned.velocity = vehicle_.believed_velocity();
+  planned.position = vehicle_.believed().translation + (effect - now()) * planned.velocity;
+  planned.yaw = yaw_of(vehicle_.believed().rotation);
+  return planned;
+}
+
+std::vector<MotionState> ChainLoop::decide(double effect) {
+  const double time = now();
+  ChainFrame& frame = record_.frames.back();
+  frame.tracking =
+      tick_ == 0 ? 0 : (vehicle_.believed().translation - planning::state_at(motion_, time).position).norm();
+  if (effect < climbed_) {
+    watch_.add({time, planning::PlanKind::committed, 0, 0, 0});
+    return motion_;
+  }
+  const MotionState from = start_of_plan(effect);
+  frame.blind = time - last_depth_ > options_.blind_after;
+  if (frame.blind) {
+    std::vector<MotionState> stop;
+    planning::foretell(from, {}, 0, options_.planner.step, options_.planner.vehicle, stop);
+    watch_.add({time, planning::PlanKind::committed, 0, 0, 0});
+    return stop;
+  }
+  const std::array start = {ground_, map_start_};
+  const bool near_start = (from.position - map_start_).norm() < options_.known_start + kStartInSight;
+  const auto known =
+      near_start && options_.known_start > 0 ? view_->flown(start, options_.known_start) : view_;
+  window_.set(*known, from.position, planner_->radius(0));
+  const planning::MapSpace space(known);
+  const Vector3d goal = T_map_world_ * goal_;
+  const planning::LocalPlan& plan = planner_->plan(from, goal, space, window_, 0.5 * frame.tracking);
+  watch_.add({time, plan.kind, plan.speed_limit, plan.free_reach, plan.valid});
+  return plan.motion;
+}
+
+/// False if it touches something or believes itself at the goal.
+bool ChainLoop::fly_until(int tick) {
+  constexpr int kLookEvery = 2;  // steps: 100 Hz
+  for (; tick_ < tick; ++tick_) {
+    const double time = now();
+    const MotionState asked = planning::state_at(motion_, time);
+    const MotionState next = planning::state_at(motion_, time + kLookAhead);
+    vehicle_.fly({asked.position, asked.velocity, (next.velocity - asked.velocity) / kLookAhead, asked.yaw},
+                 T_map_smooth_, time);
+    if (tick_ % kLookEvery != 0) continue;
+    if (!watch_.look(level(vehicle_.truth(), now()))) return false;
+    const Vector3d left = T_map_world_ * goal_ - vehicle_.believed().translation;
+    if (left.head<2>().norm() < options_.planner.arrival) return false;
+  }
+  return true;
+}
+
+void ChainLoop::frame() {
+  const double time = now();
+  ChainFrame frame;
+  frame.time = time;
+  const auto number = static_cast<int>(record_.frames.size());
+  constexpr int kDropEvery = 10;
+  const bool arrives = options_.fault.kind != Fault::dropped_frames || number % kDropEvery != kDropEvery - 1;
+  Time stamp = vehicle_.truth().time;
+  image_ = arrives ? picture(stamp) : cv::Mat();
+  update_ = nullptr;
+  record_.frames.push_back(frame);
+  const double began = processor_seconds();
+  if (arrives) look(image_, stamp);
+  const Eigen::Vector3d& truth = vehicle_.truth().position;
+  record_.frames.back().believed =
+      tick_ == 0 ? truth : (record_.T_world_map * vehicle_.believed()).translation;
+  record_.frames.back().drift = (record_.frames.back().believed - truth).norm();
+  record_.frames.back().seconds = processor_seconds() - began;
+}
+
+Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>& observer) {
+  const auto finish = [&](Outcome outcome) -> Result<ChainRecord> {
+    record_.flight = watch_.finished(outcome);
+    record_.view = view_;
+    record_.mapper = std::make_shared<ObstacleMapper>(std::move(mapper_));
+    for (const ChainFrame& f : record_.frames) record_.seconds_blind += f.blind ? 1 / options_.frame_rate : 0;
+    return std::move(record_);
+  };
+  if (!take_off()) return finish(Outcome::never_ready);
+  const int ticks =
+      std::max(1, static_cast<int>(std::lround(1 / (options_.frame_rate * NavigatedVehicle::step))));
+  const double period = ticks * NavigatedVehicle::step;
+  const double way = (task_.goal - task_.start).norm();
+  while (now() < options_.time_limit) {
+    frame();
+    const double began = processor_seconds();
+    std::vector<MotionState> next = decide(now() + period);
+    record_.frames.back().seconds += processor_seconds() - began;
+    if (observer && !observer({std::clamp(1 - watch_.goal_distance() / way, 0.0, 1.0), image_, update_,
+                               record_.frames.back()}))
+      return Error{"the flight was interrupted"};
+    const auto until = static_cast<int>(tick_) + ticks;
+    if (!fly_until(until)) {
+      const Vector3d left = T_map_world_ * goal_ - vehicle_.believed().translation;
+      if (left.head<2>().norm() >= options_.planner.arrival) return finish(Outcome::timed_out);
+      return finish(watch_.goal_distance() < kAtTheGoal ? Outcome::arrived : Outcome::astray);
+    }
+    motion_ = std::move(next);
+  }
+  return finish(Outcome::timed_out);
+}
+
+}  // namespace
+
+ObstacleMapperOptions ChainFlightOptions::outdoors() {
+  ObstacleMapperOptions options;
+  options.footing.on = true;
+  return options;
+}
+
+Result<ChainRecord> fly_chain(const FlightTask& task, const ChainFlightOptions& options,
+                              const std::function<bool(const ChainMoment&)>& observer) {
+  const std::array<OptionRange, 7> ranges = {{{"climb", options.climb, 0, 100},
+                                              {"frame_rate", options.frame_rate, 1, 100},
+                                              {"time_limit", options.time_limit, above_zero, 1e5},
+                                              {"stand", options.stand, 0, kLongestStand},
+                                              {"known_start", options.known_start, 0, 100},
+                                              {"blind_after", options.blind_after, above_zero, 100},
+                                              {"width", static_cast<double>(options.width), 64, 4096}}};
+  if (const Status s = check_ranges(ranges); !s) return s.error();
+  if (const Status s = check(options.vehicle.model); !s) return s.error();
+  if (const Status s = navigation::check(options.vehicle.navigation); !s) return s.error();
+  if (const auto planner = planning::LocalPlanner::create(options.planner); !planner)
+    return Error{"planner: " + planner.error().message};
+  auto mapper = ObstacleMapper::create(forward_camera(options.width), options.mapper);
+  if (!mapper) return mapper.error();
+  const Vector3d way = task.goal - task.start;
+  return ChainLoop(task, options, std::move(mapper).value(), std::atan2(way.y(), way.x())).run(observer);
+}
+
+}  // namespace pade::closed_loop

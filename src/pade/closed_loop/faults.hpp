@@ -1,0 +1,65 @@
+// What goes wrong in a flight on purpose.
+#pragma once
+
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "pade/core/options.hpp"
+
+namespace pade::closed_loop {
+
+/// One kind of fault. Those with a beginning and an end last from `FaultOptions::from` for
+/// `FaultOptions::duration`; the rest last the whole flight.
+enum class Fault {
+  none,
+  gnss_outage,     ///< no position and no velocity from the satellites, for a time
+  frozen_camera,   ///< the same image again and again, with new stamps, for a time
+  late_stamps,     ///< images are stamped later than they were taken
+  early_stamps,    ///< ... earlier
+  gust,            ///< wind from the side, for a time
+  exposure_jump,   ///< the light that reaches the sensor halves and doubles, every second
+  dropped_frames,  ///< one frame in ten never arrives
+  compass_error,   ///< the magnetometer is turned about the vertical
+  motion_blur,     ///< exposure of 10 ms
+};
+
+struct FaultOptions {
+  Fault kind = Fault::none;
+  double from = 6;                ///< s after take-off
+  double duration = 10;           ///< s
+  double stamp_error = 0.03;      ///< s
+  double gust = 5;                ///< m/s
+  double compass_error = 0.5236;  ///< rad
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("kind", self.kind, "what goes wrong");
+    field("from", self.from, "s after take-off, of what has a beginning");
+    field("duration", self.duration, "s, of what has an end");
+    field("stamp_error", self.stamp_error, "s between a stamp and its image");
+    field("gust", self.gust, "wind of a gust, m/s");
+    field("compass_error", self.compass_error, "turn of the magnetometer about the vertical, rad");
+  }
+  /// Whether it goes on at this time of a flight (s).
+  [[nodiscard]] bool is_on(Fault what, double time) const {
+    return kind == what && time >= from && time < from + duration;
+  }
+};
+
+}  // namespace pade::closed_loop
+
+template <>
+struct pade::EnumNames<pade::closed_loop::Fault> {
+  using F = pade::closed_loop::Fault;
+  static constexpr std::array names = {std::pair{F::none, std::string_view("none")},
+                                       std::pair{F::gnss_outage, std::string_view("gnss-outage")},
+                                       std::pair{F::frozen_camera, std::string_view("frozen-camera")},
+                                       std::pair{F::late_stamps, std::string_view("late-stamps")},
+                                       std::pair{F::early_stamps, std::string_view("early-stamps")},
+                                       std::pair{F::gust, std::string_view("gust")},
+                                       std::pair{F::exposure_jump, std::string_view("exposure-jump")},
+                                       std::pair{F::dropped_frames, std::string_view("dropped-frames")},
+                                       std::pair{F::compass_error, std::string_view("compass-error")},
+                                       std::pair{F::motion_blur, std::string_view("motion-blur")}};
+};

@@ -1,0 +1,63 @@
+#include "pade/closed_loop/flight_record.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace pade::closed_loop {
+namespace {
+
+constexpr double kFarthest = 2;     // clearances are measured up to here, m
+constexpr double kStanding = 0.05;  // m/s
+constexpr double kMoving = 0.3;     // m/s
+
+}  // namespace
+
+Camera forward_camera(int width) {
+  Camera camera;
+  camera.width = width;
+  camera.height = width * 3 / 4;
+  camera.fx = camera.fy = 554.26 * width / 640;
+  camera.cx = 0.5 * (camera.width - 1);
+  camera.cy = 0.5 * (camera.height - 1);
+  return camera;
+}
+
+double yaw_of(const Eigen::Quaterniond& R_world_body) {
+  const Eigen::Vector3d nose = R_world_body * Eigen::Vector3d::UnitX();
+  return std::atan2(nose.y(), nose.x());
+}
+
+bool FlightWatch::look(const planning::MotionState& truth) {
+  const double clearance =
+      task_.surface.inside(truth.position) ? 0 : task_.surface.to(truth.position, kFarthest);
+  if (!record_.samples.empty())
+    record_.length += (truth.position - record_.samples.back().state.position).norm();
+  record_.samples.push_back({truth, clearance});
+  const double speed = truth.velocity.norm();
+  if (moving_ && speed < kStanding) ++record_.stops;
+  moving_ = speed > kMoving || (moving_ && speed >= kStanding);
+  collided_ = collided_ || clearance < radius_;
+  return !collided_;
+}
+
+double FlightWatch::goal_distance() const {
+  const Eigen::Vector3d& at = record_.samples.empty() ? task_.start : record_.samples.back().state.position;
+  return (at - task_.goal).head<2>().norm();
+}
+
+FlightRecord FlightWatch::finished(Outcome outcome) {
+  record_.outcome = collided_ ? Outcome::collided : outcome;
+  record_.goal_distance = goal_distance();
+  record_.least_clearance = kFarthest;
+  for (const FlightSample& sample : record_.samples)
+    record_.least_clearance = std::min(record_.least_clearance, sample.clearance);
+  if (record_.samples.empty()) return std::move(record_);
+  record_.duration = record_.samples.back().state.time;
+  const double made_good =
+      (task_.goal - task_.start).norm() - (task_.goal - record_.samples.back().state.position).norm();
+  if (record_.duration > 0) record_.goal_velocity = made_good / record_.duration;
+  return std::move(record_);
+}
+
+}  // namespace pade::closed_loop

@@ -1,0 +1,122 @@
+#include "pade/depth/image/footing.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "pade/core/option_check.hpp"
+
+namespace pade::depth {
+namespace {
+
+constexpr std::size_t kFirst = 12;  // pixels with texture that are asked
+constexpr std::size_t kFewest = 3;  // of them that have to answer, and half of them
+constexpr double kSteepest = 0.5;   // least share of up that is upward in the image: 60 degrees
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+/// The columns of an image, along the vertical through the camera.
+class Columns {
+ public:
+  Columns(const DepthImage& image, const Eigen::Vector3d& up) : image_(image), lean_(-up.x() / up.y()) {}
+
+  /// Of the pixel below (u, v) in its column; outside of the image where there is none.
+  [[nodiscard]] cv::Point below(int u, int v) const { return {u - shift(v) + shift(v + 1), v + 1}; }
+  [[nodiscard]] bool holds(cv::Point p) const {
+    return p.x >= 0 && p.x < image_.bound.cols && p.y < image_.bound.rows;
+  }
+  [[nodiscard]] bool is_blank(cv::Point p) const {
+    return image_.state.at<std::uint8_t>(p) == static_cast<std::uint8_t>(DepthState::no_texture);
+  }
+  /// The lower quartile of the bounds of the first pixels with texture from `p` on downward; NaN where too
+  /// few have one.
+  [[nodiscard]] float footing(cv::Point p) const;
+
+ private:
+  /// Whole pixels, the same for all of a row: no column is lost.
+  [[nodiscard]] int shift(int v) const {
+    return static_cast<int>(std::lround(lean_ * (image_.bound.rows - 1 - v)));
+  }
+
+  const DepthImage& image_;
+  double lean_;  // to the right per row upward
+};
+
+float Columns::footing(cv::Point p) const {
+  std::array<float, kFirst> bounds{};
+  std::size_t answers = 0;
+  std::size_t asked = 0;
+  for (; asked < bounds.size() && holds(p); p = below(p.x, p.y)) {
+    if (is_blank(p)) continue;
+    ++asked;
+    const float bound = image_.bound.at<float>(p);
+    if (bound > 0) bounds[answers++] = bound;
+  }
+  if (answers < kFewest || 2 * answers < asked) return kNone;
+  auto* const low = bounds.data() + answers / 4;  // edges and wrong matches make single bounds small
+  std::nth_element(bounds.data(), low, bounds.data() + answers);
+  return *low;
+}
+
+/// A patch without texture is one surface: what is not known of a column of it is no nearer than the known
+/// ones to both sides.
+void fill_gaps(float* footing, const std::uint8_t* state, int width) {
+  constexpr int kRim = 16;  // px that one known side may answer for
+  const auto is_blank = [&](int u) { return state[u] == static_cast<std::uint8_t>(DepthState::no_texture); };
+  int u = 0;
+  while (u < width) {
+    if (!is_blank(u)) {
+      ++u;
+      continue;
+    }
+    int last = -1;  // known column of this run
+    int end = u;
+    for (; end < width && is_blank(end); ++end) {
+      if (!(footing[end] > 0)) continue;
+      const int first = last < 0 ? std::max(u, end - kRim) : last + 1;
+      const float least = last < 0 ? footing[end] : std::min(footing[last], footing[end]);
+      std::fill(footing + first, footing + end, least);
+      last = end;
+    }
+    if (last >= 0) std::fill(footing + last + 1, footing + std::min(end, last + 1 + kRim), footing[last]);
+    u = end;
+  }
+}
+
+}  // namespace
+
+Status check(const FootingOptions& options) {
+  const std::array<OptionRange, 1> ranges = {{{"headroom", options.headroom, 0, 1000}}};
+  return check_ranges(ranges);
+}
+
+/// Row by row from below, so that a patch hands on what it stands on.
+void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vector3d& up,
+                      const FootingOptions& options) {
+  if (image.bound.empty() || -up.y() < kSteepest || std::abs(up.x()) > -up.y()) return;
+  const Columns columns(image, up);
+  const int width = image.bound.cols;
+  cv::Mat footing(image.bound.size(), CV_32FC1, cv::Scalar(kNone));
+  for (int v = image.bound.rows - 1; v >= 0; --v) {
+    const double y = (cell_centre(v, image.window) - camera.cy) / camera.fy;
+    auto* found = footing.ptr<float>(v);
+    for (int u = 0; u < width; ++u) {
+      const cv::Point below = columns.below(u, v);
+      if (!columns.is_blank({u, v}) || !columns.holds(below)) continue;
+      found[u] = columns.is_blank(below) ? footing.at<float>(below) : columns.footing(below);
+    }
+    fill_gaps(found, image.state.ptr<std::uint8_t>(v), width);
+    for (int u = 0; u < width; ++u) {
+      if (!(found[u] > 0)) continue;
+      const double x = (cell_centre(u, image.window) - camera.cx) / camera.fx;
+      const double climb = up.dot(Eigen::Vector3d(x, y, 1));  // m of height per m of depth
+      const double most = climb > 0 ? options.headroom / climb : std::numeric_limits<double>::infinity();
+      auto& bound = image.bound.at<float>(v, u);
+      const float free = std::min(found[u], static_cast<float>(most));
+      if (!(bound >= free)) bound = free;
+    }
+  }
+}
+
+}  // namespace pade::depth
