@@ -1,5 +1,5 @@
-// The map in tiles against the same map on OctoMap's octree, voxel by voxel: not only the same classes but the same
-// log-odds, bit for bit, and the same counts.
+// The map in tiles against the same map on OctoMap's octree, voxel by voxel: not only the same classes but
+// the same log-odds, bit for bit, and the same counts.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -37,7 +37,9 @@ struct Leaf {
 
 std::vector<Leaf> leaves_of(const VoxelStore& store) {
   std::vector<Leaf> leaves;
-  store.for_each([&](std::uint64_t code, unsigned depth, float log_odds) { leaves.push_back({code, depth, log_odds}); });
+  store.for_each([&](std::uint64_t code, unsigned depth, float log_odds) {
+    leaves.push_back({code, depth, log_odds});
+  });
   return leaves;
 }
 
@@ -100,7 +102,9 @@ void add_bounds(DepthImage& image, std::mt19937_64& random) {
   image.bound = image.depth.clone();
   for (float& bound : cv::Mat_<float>(image.bound)) {
     const float part = share(random);
-    bound = random() % 20 == 0 ? std::numeric_limits<float>::quiet_NaN() : std::isnan(bound) ? 18 * part : bound * part;
+    bound = random() % 20 == 0  ? std::numeric_limits<float>::quiet_NaN()
+            : std::isnan(bound) ? 18 * part
+                                : bound * part;
   }
 }
 
@@ -149,7 +153,8 @@ TEST(TreeAgreement, ImagesPosesAndOptionsAtRandomGiveTheSameLogOddsBitForBit) {
       for (int v = 0; v < height; ++v) {
         for (int u = 0; u < width; ++u) {
           const double z = base + slope * u + (random() % 9 == 0 ? 3 * unit(random) : 0.02 * unit(random));
-          image.depth.at<float>(v, u) = random() % 11 == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(z);
+          image.depth.at<float>(v, u) =
+              random() % 11 == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(z);
         }
       }
       const double relative = 0.1 * (1 + unit(random));
@@ -158,7 +163,8 @@ TEST(TreeAgreement, ImagesPosesAndOptionsAtRandomGiveTheSameLogOddsBitForBit) {
       if (random() % 2 == 0) add_bounds(image, random);
       Pose pose;
       pose.rotation = rotation_exp({0.3 * unit(random), 0.3 * unit(random), 3 * unit(random)});
-      pose.translation = seed % 5 == 0 ? Vector3d(32767 * options.voxel, 0, 0) : Vector3d(0.2 * k, unit(random), unit(random));
+      pose.translation = seed % 5 == 0 ? Vector3d(32767 * options.voxel, 0, 0)
+                                       : Vector3d(0.2 * k, unit(random), unit(random));
       pair.integrate(image, kSmall, pose);
     }
     pair.compare();
@@ -173,7 +179,8 @@ TEST(TreeAgreement, ATreeThatIsTakenOverComesBackAsItWas) {
   auto tree = std::make_unique<octomap::OcTree>(0.1);  // and cubes larger than any that an image makes
   tree->setNodeValue(octomap::OcTreeKey(0, 0, 0), -0.4F, true);
   tree->getRoot()->setLogOdds(-0.4F);
-  while (tree->getRoot() != nullptr && tree->nodeHasChildren(tree->getRoot())) tree->deleteNodeChild(tree->getRoot(), 0);
+  while (tree->getRoot() != nullptr && tree->nodeHasChildren(tree->getRoot()))
+    tree->deleteNodeChild(tree->getRoot(), 0);
   const OccupancyMap all = std::move(OccupancyMap::create({}, std::move(tree))).value();
   EXPECT_EQ(leaves_of(all.voxels()), (std::vector<Leaf>{{0, 0, -0.4F}}));
   EXPECT_EQ(all.at({1, 2, 3}), Occupancy::free);

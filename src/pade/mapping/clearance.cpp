@@ -187,8 +187,9 @@ void Clearance::find_holes(const cv::Mat& depth) {
 
 /// Whether it is small enough, and ends within the image.
 bool Clearance::may_close(const Hole& hole, int largest) const {
-  return hole.left > 0 && hole.top > 0 && hole.right < camera_.width - 1 && hole.bottom < camera_.height - 1 &&
-         hole.right - hole.left <= largest && hole.bottom - hole.top <= largest && !hole.sees_obstacle;
+  return hole.left > 0 && hole.top > 0 && hole.right < camera_.width - 1 &&
+         hole.bottom < camera_.height - 1 && hole.right - hole.left <= largest &&
+         hole.bottom - hole.top <= largest && !hole.sees_obstacle;
 }
 
 /// Marks those of the small spots that have measured something before `end`.
@@ -230,12 +231,14 @@ void Clearance::close_holes(const cv::Mat& depth) {
     note_obstacles(depth, end, largest);
     for (std::size_t i = 0; i < runs_.size(); ++i) {
       const Run& run = runs_[i];
-      if (!may_close(holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))], largest)) continue;
+      if (!may_close(holes_[static_cast<std::size_t>(hole_of(static_cast<std::int32_t>(i)))], largest))
+        continue;
       const std::size_t first = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(depth.cols) +
                                 static_cast<std::size_t>(run.first);
       const auto count = static_cast<std::size_t>(run.last - run.first + 1);
       std::fill_n(ends_.begin() + static_cast<std::ptrdiff_t>(first), count, end);
-      std::fill_n(ranks_.begin() + static_cast<std::ptrdiff_t>(first), count, static_cast<std::uint8_t>(rank + 1));
+      std::fill_n(ranks_.begin() + static_cast<std::ptrdiff_t>(first), count,
+                  static_cast<std::uint8_t>(rank + 1));
     }
   }
   for (float& end : ends_) end = end >= 0 ? end : 0;
@@ -247,7 +250,8 @@ void Clearance::rank_ends(const std::vector<std::pair<float, int>>& sizes) {
   for (const auto& size : sizes) depths.push_back(size.first);
   ranks_.resize(ends_.size());
   PADE_DISPATCH(rank_all, simd::best())
-  (ends_.data(), static_cast<int>(ends_.size()), depths.data(), static_cast<int>(depths.size()), ranks_.data());
+  (ends_.data(), static_cast<int>(ends_.size()), depths.data(), static_cast<int>(depths.size()),
+   ranks_.data());
 }
 
 /// Where every voxel within range covers 3 x 3 cells or more, a far end that no 3 x 3 cells around it share
@@ -266,7 +270,9 @@ void Clearance::drop_lone_ends(int width, int height) {
 void Clearance::halve(const Level& fine, Level& coarse) const {
   const std::vector<float>& far = fine.farthest.empty() ? fine.nearest : fine.farthest;
   for (int v = 0; v < coarse.height; ++v) {
-    const auto row = [&](int y) { return static_cast<std::ptrdiff_t>(std::min(y, fine.height - 1)) * fine.stride; };
+    const auto row = [&](int y) {
+      return static_cast<std::ptrdiff_t>(std::min(y, fine.height - 1)) * fine.stride;
+    };
     const auto out = static_cast<std::ptrdiff_t>(v) * coarse.stride;
     PADE_DISPATCH(halve_row, simd::best())
     (fine.nearest.data() + row(2 * v), fine.nearest.data() + row(2 * v + 1), far.data() + row(2 * v),

@@ -60,7 +60,7 @@ class Clearance {
   struct Level {
     int width = 0;
     int height = 0;
-    int stride = 0;  // rows are longer, so that eight cells can be read from each
+    int stride = 0;                        // rows are longer, so that eight cells can be read from each
     std::vector<float> nearest, farthest;  // farthest of the finest level: nearest
   };
   /// Neighbouring cells of a row that end before the same depth.
@@ -95,7 +95,8 @@ class Clearance {
   Eigen::Vector4d side_x_, side_y_, side_z_;  // inward normals of the viewing frustum's sides, camera
   Eigen::Vector4d side_reach_;                // half extents of a cube of side 1 along them
   std::vector<float> ends_, scratch_;         // where the free part of each cell's ray ends; 0 = unknown
-  std::vector<std::uint8_t> ranks_;  // of each cell: the first of the hole sizes at whose depth it is not free
+  std::vector<std::uint8_t>
+      ranks_;  // of each cell: the first of the hole sizes at whose depth it is not free
   std::vector<Run> runs_;
   std::vector<Hole> holes_;
   std::vector<Level> levels_;

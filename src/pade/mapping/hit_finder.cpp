@@ -33,8 +33,8 @@ const Value* row_of(const cv::Mat& image, int v) {
   return image.empty() ? nullptr : image.ptr<Value>(v);
 }
 
-PixelRays rays_of(const Camera& cells, const Pose& T_world_camera, const Eigen::Matrix3d& R_world_camera, int v,
-                  double voxel) {
+PixelRays rays_of(const Camera& cells, const Pose& T_world_camera, const Eigen::Matrix3d& R_world_camera,
+                  int v, double voxel) {
   const Eigen::Vector3d start =
       R_world_camera * Eigen::Vector3d(-cells.cx / cells.fx, (v - cells.cy) / cells.fy, 1);
   const Eigen::Vector3d step = R_world_camera.col(0) / cells.fx;
@@ -49,7 +49,8 @@ PixelRays rays_of(const Camera& cells, const Pose& T_world_camera, const Eigen::
 
 }  // namespace
 
-void HitFinder::find(const DepthImage& image, const Camera& cells, const Pose& T_world_camera, MapChange& change) {
+void HitFinder::find(const DepthImage& image, const Camera& cells, const Pose& T_world_camera,
+                     MapChange& change) {
   count_points(image, cells, T_world_camera, change);
   voxels_.clear();
   for (const HitGrid::Tile* tile : grid_.tiles()) {
@@ -86,7 +87,8 @@ void HitFinder::count_points(const DepthImage& image, const Camera& cells, const
     const auto* own = row_of<float>(own_variance, v);
     int uncertain = 0;
     int to_spread = 0;
-    usable({image.depth.ptr<float>(v), row_of<float>(image.variance, v), own, row_of<std::uint8_t>(image.state, v), count},
+    usable({image.depth.ptr<float>(v), row_of<float>(image.variance, v), own,
+            row_of<std::uint8_t>(image.state, v), count},
            farthest, limit, options_.voxel * options_.voxel, z_.data(), &uncertain, &to_spread);
     change.too_uncertain += static_cast<std::size_t>(uncertain);
     if (to_spread > 0) spread_row(own, v, count);
@@ -95,8 +97,8 @@ void HitFinder::count_points(const DepthImage& image, const Camera& cells, const
   }
 }
 
-/// An own sigma of more than a voxel is spread: each pixel takes one of 16 quantiles of its normal distribution, each 4 x 4
-/// pixels take all of them.
+/// An own sigma of more than a voxel is spread: each pixel takes one of 16 quantiles of its normal
+/// distribution, each 4 x 4 pixels take all of them.
 void HitFinder::spread_row(const float* own, int v, int count) {
   const double voxel = options_.voxel;
   certainty_.assign(static_cast<std::size_t>(count), HitGrid::kCertain);
@@ -115,7 +117,8 @@ void HitFinder::add_row(int count, bool is_spread, MapChange& change) {
   std::uint32_t points = 0;
   std::uint32_t certainty = 0;
   const auto add = [&] {
-    if (key < kPointOutside) grid_.add(unpacked(key), points, is_spread ? certainty : points * HitGrid::kCertain);
+    if (key < kPointOutside)
+      grid_.add(unpacked(key), points, is_spread ? certainty : points * HitGrid::kCertain);
     if (key == kPointOutside) change.outside += points;
   };
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -140,7 +143,8 @@ HitVoxel HitFinder::voxel_of(const VoxelKey& key, const HitGrid::Count& count, c
   const double pixels = cells.fx * cells.fy * options_.voxel * options_.voxel / (voxel.z * voxel.z);
   voxel.share = static_cast<float>(std::min(count.points / pixels, 1.0));
   voxel.count = count.points;
-  voxel.certainty = static_cast<float>(count.certainty) / static_cast<float>(HitGrid::kCertain * count.points);
+  voxel.certainty =
+      static_cast<float>(count.certainty) / static_cast<float>(HitGrid::kCertain * count.points);
   return voxel;
 }
 
@@ -148,11 +152,13 @@ HitVoxel HitFinder::voxel_of(const VoxelKey& key, const HitGrid::Count& count, c
 /// for their size in the image or beside the fullest of their neighbours, are not where the surface is.
 bool HitFinder::is_hit(const HitVoxel& voxel, const HitGrid::Around& around) const {
   if (voxel.z > options_.range || voxel.share < options_.hit_min_share) return false;
-  if (voxel.certainty < kCertainly) return true;  // spread on purpose: where most of it is, the looks will tell
+  if (voxel.certainty < kCertainly)
+    return true;  // spread on purpose: where most of it is, the looks will tell
   const auto most = voxel.count / std::max(options_.hit_min_of_peak, 1e-9);  // that a neighbour may have
   const VoxelKey& key = voxel.key;
   for (int i = 0; i < 27; ++i) {
-    if (points_at(around, key, key[0] + i % 3 - 1, key[1] + i / 3 % 3 - 1, key[2] + i / 9 - 1) > most) return false;
+    if (points_at(around, key, key[0] + i % 3 - 1, key[1] + i / 3 % 3 - 1, key[2] + i / 9 - 1) > most)
+      return false;
   }
   // Farther out on the ray only the tails of the noise are left, and a thin thing before a wall must not be
   // taken for one: a fifth of what is asked of a neighbour is enough there.
@@ -161,7 +167,8 @@ bool HitFinder::is_hit(const HitVoxel& voxel, const HitGrid::Around& around) con
   const Eigen::Vector3d step = side * voxel.ray.normalized();
   for (const double steps : {-3.0, -2.0, 2.0, 3.0}) {
     VoxelKey other;
-    if (key_of(centre + steps * step, 1 / side, other) && points_at(around, key, other[0], other[1], other[2]) > 5 * most)
+    if (key_of(centre + steps * step, 1 / side, other) &&
+        points_at(around, key, other[0], other[1], other[2]) > 5 * most)
       return false;
   }
   return true;

@@ -32,7 +32,8 @@ inline constexpr float kCertainly = 0.5F;
 /// Of the standard normal distribution.
 inline constexpr double kDensityAtMean = 0.3989;
 
-/// Counts the points of an image per voxel and keeps the voxels that enough of their pixels agree on. Keeps its buffers.
+/// Counts the points of an image per voxel and keeps the voxels that enough of their pixels agree on. Keeps
+/// its buffers.
 class HitFinder {
  public:
   explicit HitFinder(const MapOptions& options) : options_(options) {}
@@ -44,7 +45,8 @@ class HitFinder {
   [[nodiscard]] const std::vector<HitVoxel>& voxels() const { return voxels_; }
 
  private:
-  void count_points(const DepthImage& image, const Camera& cells, const Pose& T_world_camera, MapChange& change);
+  void count_points(const DepthImage& image, const Camera& cells, const Pose& T_world_camera,
+                    MapChange& change);
   void spread_row(const float* own, int v, int count);
   void add_row(int count, bool is_spread, MapChange& change);
   [[nodiscard]] HitVoxel voxel_of(const VoxelKey& key, const HitGrid::Count& count, const Camera& cells,

@@ -174,7 +174,8 @@ void OccupancyMap::find_free(MapChange& change) {
       s.witnesses.push_back(&view);
   }
   s.free.clear();
-  change.pending_free = mapping::find_free(s.now, s.witnesses, options_.looks_baseline == 0, options_.voxel, *voxels_, s.free);
+  change.pending_free =
+      mapping::find_free(s.now, s.witnesses, options_.looks_baseline == 0, options_.voxel, *voxels_, s.free);
   cut_out(s.free, s.occupied, s.scratch);
 }
 
@@ -219,7 +220,8 @@ MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera,
 Occupancy OccupancyMap::at(const Eigen::Vector3d& point) const {
   VoxelKey key;
   float log_odds = 0;
-  if (!key_of(point, 1 / options_.voxel, key) || !voxels_->value_at(morton_code(key), log_odds)) return Occupancy::unknown;
+  if (!key_of(point, 1 / options_.voxel, key) || !voxels_->value_at(morton_code(key), log_odds))
+    return Occupancy::unknown;
   return voxels_->is_occupied(log_odds) ? Occupancy::occupied : Occupancy::free;
 }
 

@@ -1,6 +1,6 @@
-// The obstacle map: occupancy in log-odds (Hornung et al., "OctoMap", Autonomous Robots 2013) in tiles of voxels, fed
-// with depth images whose uncertainty is known per pixel. How a depth image enters the map is derived in
-// docs/mapping.md.
+// The obstacle map: occupancy in log-odds (Hornung et al., "OctoMap", Autonomous Robots 2013) in tiles of
+// voxels, fed with depth images whose uncertainty is known per pixel. How a depth image enters the map is
+// derived in docs/mapping.md.
 #pragma once
 
 #include <array>
@@ -97,8 +97,8 @@ struct MapChange {
   std::vector<MapCell> touched;
   std::size_t hits = 0;          ///< voxels that got a hit
   std::size_t pending_hits = 0;  ///< voxels, of this image and earlier ones, that wait for another look
-  /// Voxels that this image shows free, and no earlier one from another place; without those that the map holds for as
-  /// free as can be.
+  /// Voxels that this image shows free, and no earlier one from another place; without those that the map
+  /// holds for as free as can be.
   std::size_t pending_free = 0;
   std::size_t too_uncertain = 0;  ///< pixels whose sigma is above hit_max_relative_sigma
   std::size_t outside = 0;  ///< points beyond what the octree can address (32768 voxels from the origin)
@@ -109,10 +109,10 @@ struct HitVoxel;
 
 /// What is known of a voxel, or of a cube of 2^k voxels to a side that all have the same log-odds.
 struct MapLeaf {
-  std::uint64_t code = 0;      ///< bits of the key of its lower corner interleaved, x lowest
-  unsigned depth = 16;         ///< in the octree; 16 = one voxel
-  float log_odds = 0;          ///< of its occupancy
-  bool is_occupied = false;    ///< at or above the threshold
+  std::uint64_t code = 0;    ///< bits of the key of its lower corner interleaved, x lowest
+  unsigned depth = 16;       ///< in the octree; 16 = one voxel
+  float log_odds = 0;        ///< of its occupancy
+  bool is_occupied = false;  ///< at or above the threshold
 };
 
 /// Occupied, free and unknown space.
@@ -120,7 +120,8 @@ class OccupancyMap {
  public:
   /// Refuses options that make no sense; the message names the option.
   static Result<OccupancyMap> create(const MapOptions& options = {});
-  /// A map with the content of a tree, for example one that was read from a file. The voxel size is the tree's.
+  /// A map with the content of a tree, for example one that was read from a file. The voxel size is the
+  /// tree's.
   static Result<OccupancyMap> create(const MapOptions& options, std::unique_ptr<octomap::OcTree> tree);
 
   /// @{
@@ -172,7 +173,8 @@ class OccupancyMap {
   /// Counts the whole map: time proportional to its size.
   [[nodiscard]] Counts counts() const;
 
-  /// A tree of OctoMap's with the same content, made anew: for what OctoMap, dynamicEDT3D and FCL do with one.
+  /// A tree of OctoMap's with the same content, made anew: for what OctoMap, dynamicEDT3D and FCL do with
+  /// one.
   [[nodiscard]] std::unique_ptr<octomap::OcTree> octree() const;
   /// Bytes of memory that the voxels take.
   [[nodiscard]] std::size_t memory() const;

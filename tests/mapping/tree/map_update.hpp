@@ -9,12 +9,12 @@
 #include <Eigen/Core>
 #include <octomap/OcTree.h>
 
-#include "mapping/tree/clearance.hpp"
-#include "mapping/tree/tree_map.hpp"
 #include "pade/mapping/tiles/voxel_code.hpp"
 
-namespace pade::mapping::tree {
+#include "mapping/tree/clearance.hpp"
+#include "mapping/tree/tree_map.hpp"
 
+namespace pade::mapping::tree {
 
 /// Keys interleaved bit by bit, x lowest: sorting by it walks the octree depth first.
 std::uint64_t morton_code(const octomap::OcTreeKey& key);
@@ -77,6 +77,5 @@ class UpdatableTree : public octomap::OcTree {
                     MapChange& change);
   void settle(octomap::OcTreeNode* node);
 };
-
 
 }  // namespace pade::mapping::tree

@@ -11,6 +11,7 @@
 #include <octomap/OcTree.h>
 
 #include "pade/mapping/back_projection.hpp"
+
 #include "mapping/tree/clearance.hpp"
 #include "mapping/tree/map_update.hpp"
 #include "mapping/tree/pending_hits.hpp"
@@ -125,7 +126,7 @@ Result<TreeMap> TreeMap::create(const MapOptions& options, std::unique_ptr<octom
 /// Counts the points per voxel. An own sigma of more than a voxel is spread: each pixel takes one of 16
 /// quantiles of its normal distribution, each 4 x 4 pixels take all of them.
 void TreeMap::count_points(const DepthImage& image, const Camera& cells, const Pose& T_world_camera,
-                                MapChange& change) {
+                           MapChange& change) {
   const Eigen::Matrix3d R_world_camera = T_world_camera.matrix3();
   const double voxel = options_.voxel;
   const double limit = options_.hit_max_relative_sigma * options_.hit_max_relative_sigma;

@@ -5,8 +5,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <locale>
 #include <limits>
+#include <locale>
 #include <memory>
 #include <sstream>
 #include <utility>
@@ -148,8 +148,8 @@ class StructureCheck {
   bool not_finite_ = false;
 };
 
-/// The nodes of a file, of leaves that come in the order of the octree. In a .bt file each leaf is free or occupied, and
-/// eight equal leaves are one.
+/// The nodes of a file, of leaves that come in the order of the octree. In a .bt file each leaf is free or
+/// occupied, and eight equal leaves are one.
 class NodeBytes {
  public:
   explicit NodeBytes(MapFormat format) : is_binary_(format == MapFormat::bt) {}
@@ -173,11 +173,11 @@ class NodeBytes {
   static constexpr unsigned kFree = 1, kOccupied = 2, kInner = 3;
   /// An inner node whose children are still coming.
   struct Open {
-    std::uint64_t code;   // as many bits as its depth has levels
-    std::size_t start;    // of its bytes
-    std::size_t nodes;    // with itself
-    unsigned children;    // two bits each
-    float highest;        // log-odds
+    std::uint64_t code;  // as many bits as its depth has levels
+    std::size_t start;   // of its bytes
+    std::size_t nodes;   // with itself
+    unsigned children;   // two bits each
+    float highest;       // log-odds
   };
   static unsigned bits_below(unsigned depth) { return 3 * (mapping::kTreeDepth - depth); }
   [[nodiscard]] unsigned depth() const { return static_cast<unsigned>(open_.size()) - 1; }
@@ -236,8 +236,8 @@ class NodeBytes {
 }  // namespace
 
 ByteSource encode_map(const mapping::OccupancyMap& map, MapFormat format) {
-  // Written here, without an octree of OctoMap's, whose header is in the locale of the stream and gives res with six
-  // digits.
+  // Written here, without an octree of OctoMap's, whose header is in the locale of the stream and gives res
+  // with six digits.
   return [&map, format](const ByteSink& sink) {
     NodeBytes nodes(format);
     map.for_each_leaf([&nodes](const mapping::MapLeaf& leaf) { nodes.add(leaf); });

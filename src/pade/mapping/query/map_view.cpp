@@ -66,8 +66,8 @@ std::shared_ptr<const MapView> MapView::of(const OccupancyMap& map) { return of(
 
 std::shared_ptr<const MapView> MapView::of(const OccupancyMap& map, const AlignedBox3d& window) {
   const std::array<TouchedCube, 1> all{};
-  TileTree tiles =
-      rebuilt(empty_tiles(map.voxels(), map.options().voxel), map.voxels(), all, window_in_tiles(window, map.options().voxel));
+  TileTree tiles = rebuilt(empty_tiles(map.voxels(), map.options().voxel), map.voxels(), all,
+                           window_in_tiles(window, map.options().voxel));
   return std::shared_ptr<const MapView>(new MapView(std::move(tiles), window));
 }
 
@@ -91,7 +91,8 @@ std::shared_ptr<const MapView> MapView::flown(std::span<const Vector3d> path, do
       std::uint64_t fresh = inside[z] & ~old.words[z].known;
       tile->words[z].known |= fresh;
       for (; fresh != 0; fresh &= fresh - 1)
-        tile->log_odds[index_in_tile(std::countr_zero(fresh) & 7, std::countr_zero(fresh) >> 3, static_cast<int>(z))] = -127;
+        tile->log_odds[index_in_tile(std::countr_zero(fresh) & 7, std::countr_zero(fresh) >> 3,
+                                     static_cast<int>(z))] = -127;
     }
     tile->summarise();
     changed.emplace_back(place, std::move(tile));

@@ -50,7 +50,8 @@ namespace {
 
 std::int8_t quantised(float log_odds, float per_step) {
   const float steps = std::clamp(log_odds * per_step, -127.0F, 127.0F);
-  return static_cast<std::int8_t>(static_cast<int>(steps + (steps < 0 ? -0.5F : 0.5F)));  // NOLINT(bugprone-incorrect-roundings)
+  return static_cast<std::int8_t>(
+      static_cast<int>(steps + (steps < 0 ? -0.5F : 0.5F)));  // NOLINT(bugprone-incorrect-roundings)
 }
 
 /// Swaps two bits of the index of each bit of a word.
@@ -91,7 +92,8 @@ std::shared_ptr<const Tile> make_tile(const VoxelTile& from, float per_step) {
     add_eighth(in_rows(from.known[eighth]), eighth, &Tile::Word::known, *tile);
     add_eighth(in_rows(from.occupied[eighth]), eighth, &Tile::Word::occupied, *tile);
   }
-  for (std::size_t i = 0; i < from.log_odds.size(); ++i) tile->log_odds[i] = quantised(from.log_odds[i], per_step);
+  for (std::size_t i = 0; i < from.log_odds.size(); ++i)
+    tile->log_odds[i] = quantised(from.log_odds[i], per_step);
   tile->summarise();
   return tile;
 }

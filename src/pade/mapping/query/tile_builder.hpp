@@ -1,5 +1,5 @@
-// Makes trees of tiles from the voxels of a map, whole or where it has changed, and trees with other tiles in some
-// places.
+// Makes trees of tiles from the voxels of a map, whole or where it has changed, and trees with other tiles in
+// some places.
 #pragma once
 
 #include <cstdint>

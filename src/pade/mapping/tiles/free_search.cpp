@@ -19,8 +19,8 @@ struct Kernels {
 
 Kernels kernels() {
   const simd::InstructionSet set = simd::best();
-  return {PADE_DISPATCH(place_voxels, set), PADE_DISPATCH(move_voxels, set),
-          PADE_DISPATCH(move_corners, set), PADE_DISPATCH(look_at_eight, set), PADE_DISPATCH(free_voxels, set)};
+  return {PADE_DISPATCH(place_voxels, set), PADE_DISPATCH(move_voxels, set), PADE_DISPATCH(move_corners, set),
+          PADE_DISPATCH(look_at_eight, set), PADE_DISPATCH(free_voxels, set)};
 }
 
 /// Bit i becomes byte i.
@@ -32,7 +32,8 @@ std::uint64_t bytes_of(unsigned bits) {
   return (spread & 0x0101010101010101U) * 255U;
 }
 
-/// Walks space from the top as an octree, all in the camera's frame, down to tiles; below by 64 voxels at once.
+/// Walks space from the top as an octree, all in the camera's frame, down to tiles; below by 64 voxels at
+/// once.
 class FreeSpaceSearch {
  public:
   FreeSpaceSearch(const Clearance& now, std::span<const Clearance* const> earlier, bool alone, double voxel,
@@ -52,7 +53,8 @@ class FreeSpaceSearch {
       witness.t_witness_now = clearance->in_camera(now.origin());
       witness.view = clearance->for_voxels(witness.levels);
       for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column) witness.motion.r[3 * row + column] = witness.R_witness_now(row, column);
+        for (int column = 0; column < 3; ++column)
+          witness.motion.r[3 * row + column] = witness.R_witness_now(row, column);
         witness.motion.t[row] = witness.t_witness_now[row];
       }
     }
@@ -81,11 +83,12 @@ class FreeSpaceSearch {
   };
 
   [[nodiscard]] Cube part_of(const Cube& cube, std::uint64_t i) const {
-    return {cube.code | i << bits_below(cube.depth + 1), cube.centre + cube.side * to_child_[i], 0.5 * cube.side,
-            cube.depth + 1};
+    return {cube.code | i << bits_below(cube.depth + 1), cube.centre + cube.side * to_child_[i],
+            0.5 * cube.side, cube.depth + 1};
   }
   [[nodiscard]] View look_from(const Witness& witness, const Cube& cube) const {
-    return witness.clearance->look_at(witness.R_witness_now * cube.centre + witness.t_witness_now, cube.side, false);
+    return witness.clearance->look_at(witness.R_witness_now * cube.centre + witness.t_witness_now, cube.side,
+                                      false);
   }
 
   /// What the witnesses in `open` say: free where one of them does. Those that know nothing leave `open`.
@@ -112,7 +115,8 @@ class FreeSpaceSearch {
         FreeCube& free = out_.emplace_back(FreeCube{cube.code, cube.depth, {}});
         if (cube.depth == kTileDepth) free.voxels.fill(kAll);
       }
-      if (confirmed == View::nothing) pending_ += voxels_of(cube.depth) - store_.count_least(cube.code, cube.depth);
+      if (confirmed == View::nothing)
+        pending_ += voxels_of(cube.depth) - store_.count_least(cube.code, cube.depth);
       if (confirmed != View::partly) return;
     }
     if (cube.depth == kTileDepth) return visit_tile(cube, seen, open);
@@ -153,7 +157,8 @@ class FreeSpaceSearch {
 
   /// Of the voxels asked for, those that are free in a view: cubes of 2 x 2 x 2 first.
   template <class Place>
-  std::uint64_t free_in(const LookView& view, const double* corners, std::uint64_t asked, const Place& place) const {
+  std::uint64_t free_in(const LookView& view, const double* corners, std::uint64_t asked,
+                        const Place& place) const {
     unsigned free = 0;
     unsigned nothing = 0;
     kernels_.look_at_eight(view, corners, &free, &nothing);
@@ -196,7 +201,7 @@ class FreeSpaceSearch {
   std::vector<FreeCube>& out_;
   Kernels kernels_ = kernels();
   std::array<Eigen::Vector3d, 8> to_child_;  // from the centre of a cube of side 1 to those of its eighths
-  std::array<double, 24> to_voxel_{};        // from the centre of 2 x 2 x 2 voxels to theirs: all x, all y, all z
+  std::array<double, 24> to_voxel_{};  // from the centre of 2 x 2 x 2 voxels to theirs: all x, all y, all z
   std::vector<EndsLevel> levels_;
   LookView view_;
   std::vector<Witness> witnesses_;
@@ -221,7 +226,8 @@ void divide(const FreeCube& cube, std::span<const std::uint64_t> hits, std::vect
   for (std::uint64_t i = 0; i < 8; ++i) {
     FreeCube part{cube.code | i << below, cube.depth + 1, {}};
     if (part.depth == kTileDepth) part.voxels.fill(kAll);
-    const auto end = std::find_if(hits.begin(), hits.end(), [&](std::uint64_t hit) { return hit >> below != part.code >> below; });
+    const auto end = std::find_if(hits.begin(), hits.end(),
+                                  [&](std::uint64_t hit) { return hit >> below != part.code >> below; });
     const auto count = static_cast<std::size_t>(end - hits.begin());
     divide(part, hits.first(count), out);
     hits = hits.subspan(count);
@@ -230,12 +236,13 @@ void divide(const FreeCube& cube, std::span<const std::uint64_t> hits, std::vect
 
 }  // namespace
 
-std::size_t find_free(const Clearance& now, std::span<const Clearance* const> earlier, bool alone, double voxel,
-                      const VoxelStore& store, std::vector<FreeCube>& out) {
+std::size_t find_free(const Clearance& now, std::span<const Clearance* const> earlier, bool alone,
+                      double voxel, const VoxelStore& store, std::vector<FreeCube>& out) {
   return FreeSpaceSearch(now, earlier, alone, voxel, store, out).search();
 }
 
-void cut_out(std::vector<FreeCube>& cubes, std::span<const std::uint64_t> hits, std::vector<FreeCube>& scratch) {
+void cut_out(std::vector<FreeCube>& cubes, std::span<const std::uint64_t> hits,
+             std::vector<FreeCube>& scratch) {
   scratch.clear();
   auto hit = hits.begin();
   for (const FreeCube& cube : cubes) {

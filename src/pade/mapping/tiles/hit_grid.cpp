@@ -42,7 +42,8 @@ HitGrid::Tile& HitGrid::opened(std::uint64_t tile) {
 void HitGrid::grow() {
   constexpr std::size_t kSmallest = 1U << 12U;
   slots_.assign(std::max(kSmallest, 4 * slots_.size()), 0U);
-  for (std::size_t i = 0; i < used_; ++i) slots_[slot_of(tiles_[i]->code)] = static_cast<std::uint32_t>(i + 1);
+  for (std::size_t i = 0; i < used_; ++i)
+    slots_[slot_of(tiles_[i]->code)] = static_cast<std::uint32_t>(i + 1);
 }
 
 void HitGrid::clear() {

@@ -18,12 +18,13 @@ class HitGrid {
   static constexpr std::uint32_t kCertain = 256;
   struct Count {
     std::uint32_t points = 0;
-    std::uint32_t certainty = 0;  ///< sum over its points of the probability that it lies here, in units of 1 / kCertain
+    std::uint32_t certainty =
+        0;  ///< sum over its points of the probability that it lies here, in units of 1 / kCertain
   };
   struct Tile {
-    std::uint64_t code = 0;             ///< Morton code of its lower corner
-    std::array<std::uint64_t, 8> hit{}; ///< by eighths, bit = low six bits of the Morton code
-    std::array<Count, 512> counts{};    ///< in Morton order
+    std::uint64_t code = 0;              ///< Morton code of its lower corner
+    std::array<std::uint64_t, 8> hit{};  ///< by eighths, bit = low six bits of the Morton code
+    std::array<Count, 512> counts{};     ///< in Morton order
   };
   /// A tile and those around it, null where nothing was hit; x fastest, itself in the middle.
   using Around = std::array<const Tile*, 27>;

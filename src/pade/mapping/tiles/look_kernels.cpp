@@ -35,7 +35,8 @@ struct Cube {
   const double u0 = clamped(view.f_x * left * (left < 0 ? cube.per_near : cube.per_far) + view.c_x, most_u);
   const double u1 = clamped(view.f_x * right * (right < 0 ? cube.per_far : cube.per_near) + view.c_x, most_u);
   const double v0 = clamped(view.f_y * top * (top < 0 ? cube.per_near : cube.per_far) + view.c_y, most_v);
-  const double v1 = clamped(view.f_y * bottom * (bottom < 0 ? cube.per_far : cube.per_near) + view.c_y, most_v);
+  const double v1 =
+      clamped(view.f_y * bottom * (bottom < 0 ? cube.per_far : cube.per_near) + view.c_y, most_v);
   out.first_u[i] = static_cast<int>(u0 + 0.5);
   out.last_u[i] = static_cast<int>(u1 + 0.5);
   out.first_v[i] = static_cast<int>(v0 + 0.5);
@@ -46,8 +47,8 @@ struct Cube {
   return view.sides[side][0] * x + view.sides[side][1] * y + view.sides[side][2] * z;
 }
 
-[[gnu::always_inline]] inline void project(const LookView& view, const double* x, const double* y, const double* z,
-                                           Rows& out) {
+[[gnu::always_inline]] inline void project(const LookView& view, const double* x, const double* y,
+                                           const double* z, Rows& out) {
   const double half_x = view.voxel * view.reach[0];
   const double half_y = view.voxel * view.reach[1];
   const double half_z = view.voxel * view.reach[2];
@@ -93,7 +94,8 @@ struct Cells {
   const int u1 = pixels.last_u[i];
   const int v1 = pixels.last_v[i];
   int level = 0;
-  for (int extent = u1 - u0 > v1 - v0 ? u1 - u0 : v1 - v0; extent > 3 && level + 1 < view.level_count; extent /= 2)
+  for (int extent = u1 - u0 > v1 - v0 ? u1 - u0 : v1 - v0; extent > 3 && level + 1 < view.level_count;
+       extent /= 2)
     ++level;
   const EndsLevel& ends = view.levels[level];
   const int at = (v0 >> level) * ends.stride + (u0 >> level);
@@ -229,15 +231,16 @@ std::uint64_t free_voxels(const LookView& view, const VoxelCentres& centres, std
   return free;
 }
 
-void measured_row(const float* depth, const float* variance, const unsigned char* state, int count, double margin_sigmas,
-                  double range, float* ends) {
+void measured_row(const float* depth, const float* variance, const unsigned char* state, int count,
+                  double margin_sigmas, double range, float* ends) {
   constexpr double kInfinity = __builtin_inf();
   for (int u = 0; u < count; ++u) {
     const double z = depth[u];
     const double sigma = variance != nullptr ? __builtin_sqrt(static_cast<double>(variance[u])) : 0.0;
     const bool is_measured = state == nullptr || state[u] == 0;
     const double end = clamped(z - margin_sigmas * sigma, range);
-    ends[u] = is_measured & (z > 0) & (sigma >= 0) & (sigma < kInfinity) ? static_cast<float>(end) : __builtin_nanf("");
+    ends[u] = is_measured & (z > 0) & (sigma >= 0) & (sigma < kInfinity) ? static_cast<float>(end)
+                                                                         : __builtin_nanf("");
   }
 }
 
@@ -245,8 +248,8 @@ void rank_all(const float* values, int count, const float* depths, int depth_cou
   constexpr int kBlock = 64;
   for (int i = 0; i < count; i += kBlock) {
     const int n = count - i < kBlock ? count - i : kBlock;
-    int reached[kBlock] = {};     // NOLINT(*-avoid-c-arrays)
-    float block[kBlock] = {};     // NOLINT(*-avoid-c-arrays)
+    int reached[kBlock] = {};  // NOLINT(*-avoid-c-arrays)
+    float block[kBlock] = {};  // NOLINT(*-avoid-c-arrays)
     for (int k = 0; k < n; ++k) block[k] = values[i + k];
     for (int d = 0; d < depth_count; ++d) {
       const float depth = depths[d];
@@ -271,8 +274,8 @@ void halve_row(const float* near_a, const float* near_b, const float* far_a, con
   }
 }
 
-void usable_depths(const DepthRow& row, double farthest, double limit, double spread, double* z, int* uncertain,
-                   int* to_spread) {
+void usable_depths(const DepthRow& row, double farthest, double limit, double spread, double* z,
+                   int* uncertain, int* to_spread) {
   int fails = 0;
   int spreads = 0;
   for (int u = 0; u < row.count; ++u) {

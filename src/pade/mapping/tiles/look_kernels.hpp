@@ -1,4 +1,5 @@
-// Which of 64 voxels a depth image shows free, one after the other: compiled once per instruction set, same bits on each.
+// Which of 64 voxels a depth image shows free, one after the other: compiled once per instruction set, same
+// bits on each.
 #pragma once
 
 #include <cstdint>
@@ -27,9 +28,10 @@ struct LookView {
   int width, height;          ///< pixels
   double range;               ///< m
   double voxel;               ///< m
-  double reach[3];            ///< half extents of a cube of side 1 along the axes of the camera NOLINT(*-avoid-c-arrays)
-  double sides[4][3];         ///< inward normals of the viewing frustum NOLINT(*-avoid-c-arrays)
-  double side_reach[4];       ///< half extents of a cube of side 1 along them NOLINT(*-avoid-c-arrays)
+  double
+      reach[3];  ///< half extents of a cube of side 1 along the axes of the camera NOLINT(*-avoid-c-arrays)
+  double sides[4][3];    ///< inward normals of the viewing frustum NOLINT(*-avoid-c-arrays)
+  double side_reach[4];  ///< half extents of a cube of side 1 along them NOLINT(*-avoid-c-arrays)
   const EndsLevel* levels;
   int level_count;
 };
@@ -43,7 +45,8 @@ struct DepthRow {
   int count;
 };
 
-/// What place_row() knows of a row of pixels: pixel u lies at origin + z (start + u step), all in voxels' axes, m.
+/// What place_row() knows of a row of pixels: pixel u lies at origin + z (start + u step), all in voxels'
+/// axes, m.
 struct PixelRays {
   double origin[3];  // NOLINT(*-avoid-c-arrays)
   double start[3];   // NOLINT(*-avoid-c-arrays)
@@ -62,29 +65,31 @@ struct LookMotion {
 };
 
 PADE_DECLARE_KERNEL(
-    /// `corners`: centres of the eight eighths, x, y, z; `offsets`: from them to their eight voxels, eight x, y, z.
+    /// `corners`: centres of the eight eighths, x, y, z; `offsets`: from them to their eight voxels, eight x,
+    /// y, z.
     void place_voxels(const double* corners, const double* offsets, VoxelCentres& out);
     void move_voxels(const LookMotion& motion, const VoxelCentres& from, VoxelCentres& out);
     void move_corners(const LookMotion& motion, const double* from, double* out);
-    /// Of eight cubes of 2 x 2 x 2 voxels, by `corners`, one bit each: those that are free all over, and those of which
-    /// nothing is.
+    /// Of eight cubes of 2 x 2 x 2 voxels, by `corners`, one bit each: those that are free all over, and
+    /// those of which nothing is.
     void look_at_eight(const LookView& view, const double* corners, unsigned* free, unsigned* nothing);
     /// Of `asked`, bit by voxel, those that are free.
     std::uint64_t free_voxels(const LookView& view, const VoxelCentres& centres, std::uint64_t asked);
-    /// Z - margin_sigmas sigma of a row, from 0 to the range; NaN where nothing was measured (state 0) or sigma is not
-    /// finite. `variance` and `state` may be null: exact, all measured.
+    /// Z - margin_sigmas sigma of a row, from 0 to the range; NaN where nothing was measured (state 0) or
+    /// sigma is not finite. `variance` and `state` may be null: exact, all measured.
     void measured_row(const float* depth, const float* variance, const unsigned char* state, int count,
                       double margin_sigmas, double range, float* ends);
-    /// Depths that may place a point, else NaN: above 0 and up to `farthest`, variance up to limit Z^2. Counts those that
-    /// fail the limit alone, and among the usable ones those whose own variance is above `spread`.
-    void usable_depths(const DepthRow& row, double farthest, double limit, double spread, double* z, int* uncertain,
-                       int* to_spread);
+    /// Depths that may place a point, else NaN: above 0 and up to `farthest`, variance up to limit Z^2.
+    /// Counts those that fail the limit alone, and among the usable ones those whose own variance is above
+    /// `spread`.
+    void usable_depths(const DepthRow& row, double farthest, double limit, double spread, double* z,
+                       int* uncertain, int* to_spread);
     /// The voxel of each pixel: x | y << 16 | z << 32, or kNoPoint where z is NaN, or kPointOutside.
     void place_row(const PixelRays& rays, const double* z, int count, std::uint64_t* keys);
     /// Of each value how many of the depths, which ascend, it reaches: below 128. NaN reaches none.
     void rank_all(const float* values, int count, const float* depths, int depth_count, unsigned char* ranks);
     /// Nearest and farthest of 2 x 2 cells of two rows of `width` cells, which may be the same row.
-    void halve_row(const float* near_a, const float* near_b, const float* far_a, const float* far_b, int width,
-                   float* nearest, float* farthest))
+    void halve_row(const float* near_a, const float* near_b, const float* far_a, const float* far_b,
+                   int width, float* nearest, float* farthest))
 
 }  // namespace pade::mapping

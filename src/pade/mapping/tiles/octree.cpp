@@ -30,7 +30,8 @@ class GrowingTree : public octomap::OcTree {
 
 std::unique_ptr<octomap::OcTree> octree_of(const VoxelStore& store, const MapOptions& options) {
   GrowingTree growing(options.voxel);
-  store.for_each([&](std::uint64_t code, unsigned depth, float log_odds) { growing.add_leaf(code, depth, log_odds); });
+  store.for_each(
+      [&](std::uint64_t code, unsigned depth, float log_odds) { growing.add_leaf(code, depth, log_odds); });
   growing.updateInnerOccupancy();
   auto tree = std::make_unique<octomap::OcTree>(options.voxel);
   tree->setProbHit(options.p_hit);

@@ -1,5 +1,5 @@
-// Places of voxels: by their coordinates, and by the bits of the coordinates interleaved, in the order in which OctoMap
-// walks an octree.
+// Places of voxels: by their coordinates, and by the bits of the coordinates interleaved, in the order in
+// which OctoMap walks an octree.
 #pragma once
 
 #include <array>
@@ -47,7 +47,8 @@ inline Eigen::Vector3d centre_of(const VoxelKey& key, double voxel) {
 /// Low nine bits of the Morton code of a voxel.
 inline std::size_t index_in_tile(int x, int y, int z) {
   constexpr std::array<std::uint16_t, 8> kSpread{0, 1, 8, 9, 64, 65, 72, 73};
-  return static_cast<std::size_t>(kSpread[static_cast<unsigned>(x) & 7U] | kSpread[static_cast<unsigned>(y) & 7U] << 1 |
+  return static_cast<std::size_t>(kSpread[static_cast<unsigned>(x) & 7U] |
+                                  kSpread[static_cast<unsigned>(y) & 7U] << 1 |
                                   kSpread[static_cast<unsigned>(z) & 7U] << 2);
 }
 

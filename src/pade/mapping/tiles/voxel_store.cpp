@@ -9,7 +9,9 @@ namespace {
 
 constexpr std::size_t kTilesOfABlock = 256;  // of memory
 
-float log_odds_of(double probability) { return static_cast<float>(std::log(probability / (1 - probability))); }
+float log_odds_of(double probability) {
+  return static_cast<float>(std::log(probability / (1 - probability)));
+}
 
 /// Appends the voxels of an eighth of a tile, eight that make a cube as one.
 void append_cells(std::uint64_t voxels, std::uint64_t code, double voxel, std::vector<MapCell>& cells) {
@@ -151,7 +153,8 @@ void VoxelStore::join(Entry& entry, unsigned depth, const Entry& part) {
 
 /// Calls update(entry) with the entry at depth `to` that holds the voxel, and joins what has become the same.
 template <class Update>
-void VoxelStore::descend(Entry& entry, unsigned depth, std::uint64_t code, unsigned to, const Update& update) {
+void VoxelStore::descend(Entry& entry, unsigned depth, std::uint64_t code, unsigned to,
+                         const Update& update) {
   if (depth == to) {
     update(entry);
     return;
@@ -215,7 +218,8 @@ void VoxelStore::update_tile(Entry& entry, const FreeCube& free, std::span<const
   }
   if (touched) change.touched.push_back(cell_of(tile_code, kTileDepth, voxel_));
   const float first = now.log_odds[0];
-  if (now.any_unknown() || std::any_of(now.log_odds.begin(), now.log_odds.end(), [first](float value) { return value != first; }))
+  if (now.any_unknown() ||
+      std::any_of(now.log_odds.begin(), now.log_odds.end(), [first](float value) { return value != first; }))
     return;
   free_parts(entry, kTileDepth);
   entry = {Entry::kUniform, first};
@@ -256,9 +260,8 @@ void VoxelStore::miss_cube(const FreeCube& cube, MapChange& change) {
   bool changed = false;
   for (std::uint64_t code = cube.code; code < cube.code + voxels_of(cube.depth); code += voxels_of(entries)) {
     if (is_least(find(code, entries))) continue;
-    descend(root_[code >> bits_below(kRootDepth)], kRootDepth, code, entries, [&](Entry& entry) {
-      changed = miss_all(entry, code, entries, change) || changed;
-    });
+    descend(root_[code >> bits_below(kRootDepth)], kRootDepth, code, entries,
+            [&](Entry& entry) { changed = miss_all(entry, code, entries, change) || changed; });
   }
   if (changed) change.touched.push_back(cell_of(cube.code, cube.depth, voxel_));
 }
@@ -275,12 +278,13 @@ void VoxelStore::apply(std::span<const FreeCube> free, std::span<const VoxelHit>
       continue;
     }
     const std::uint64_t code = hits_first ? hits.front().code : free.front().code;
-    const auto end = std::find_if(hits.begin(), hits.end(), [code](const VoxelHit& hit) { return hit.code >> 9U != code >> 9U; });
+    const auto end = std::find_if(hits.begin(), hits.end(),
+                                  [code](const VoxelHit& hit) { return hit.code >> 9U != code >> 9U; });
     const auto in_tile = hits.first(static_cast<std::size_t>(end - hits.begin()));
-    const bool has_free = !free.empty() && free.front().code >> 9U == code >> 9U && free.front().depth == kTileDepth;
-    descend(root_[code >> bits_below(kRootDepth)], kRootDepth, code, kTileDepth, [&](Entry& entry) {
-      update_tile(entry, has_free ? free.front() : none, in_tile, change);
-    });
+    const bool has_free =
+        !free.empty() && free.front().code >> 9U == code >> 9U && free.front().depth == kTileDepth;
+    descend(root_[code >> bits_below(kRootDepth)], kRootDepth, code, kTileDepth,
+            [&](Entry& entry) { update_tile(entry, has_free ? free.front() : none, in_tile, change); });
     hits = hits.subspan(in_tile.size());
     if (has_free) free = free.subspan(1);
   }

@@ -1,5 +1,5 @@
-// What the map knows of each voxel: log-odds in tiles of 8 x 8 x 8 under nodes of 512 parts. Whatever is the same all over,
-// free or unknown, is one entry of the node above it, however large it is.
+// What the map knows of each voxel: log-odds in tiles of 8 x 8 x 8 under nodes of 512 parts. Whatever is the
+// same all over, free or unknown, is one entry of the node above it, however large it is.
 #pragma once
 
 #include <array>
@@ -71,7 +71,9 @@ class VoxelStore {
 
   /// The entry of the smallest cube that is at this depth or above: 4, 7, 10 or 13 = a tile.
   [[nodiscard]] const Entry& find(std::uint64_t code, unsigned depth) const;
-  [[nodiscard]] const VoxelTile& tile(const Entry& entry) const { return tiles_[entry.part >> 8U][entry.part & 255U]; }
+  [[nodiscard]] const VoxelTile& tile(const Entry& entry) const {
+    return tiles_[entry.part >> 8U][entry.part & 255U];
+  }
   /// Log-odds of a voxel; false if it is unknown.
   bool value_at(std::uint64_t code, float& log_odds) const;
   [[nodiscard]] bool is_occupied(float log_odds) const { return log_odds >= rules_.occupied; }
@@ -89,8 +91,8 @@ class VoxelStore {
   /// Sets all of a cube.
   void set(std::uint64_t code, unsigned depth, float log_odds);
 
-  /// Calls visitor(code, depth, log_odds) for every known cube of one value, as large as they can be, in the order of the
-  /// octree.
+  /// Calls visitor(code, depth, log_odds) for every known cube of one value, as large as they can be, in the
+  /// order of the octree.
   template <class Visitor>
   void for_each(const Visitor& visitor) const {
     leaves_of(root_, 0, 0, visitor);
@@ -102,7 +104,8 @@ class VoxelStore {
   static constexpr unsigned kRootDepth = 4;  // of the root's entries
 
   template <class Visitor>
-  void leaves_of(std::span<const Entry> entries, std::uint64_t code, unsigned depth, const Visitor& visitor) const;
+  void leaves_of(std::span<const Entry> entries, std::uint64_t code, unsigned depth,
+                 const Visitor& visitor) const;
   template <class Visitor>
   void leaves_of(const VoxelTile& tile, std::uint64_t code, const Visitor& visitor) const;
 
