@@ -6,8 +6,6 @@
 #include <cstring>
 #include <limits>
 
-#include <opencv2/imgproc.hpp>
-
 #include "pade/mapping/back_projection.hpp"
 
 namespace pade::mapping {
@@ -100,7 +98,6 @@ void Clearance::set(const DepthImage& image, const Camera& camera, const Pose& T
   // A window that straddles an edge has a depth between the two surfaces: its neighbours know the nearer one.
   if (image.window > 1) nearest_of_neighbours(ends_, scratch_, width, height);
   close_holes(image.depth);
-  drop_lone_ends(width, height);
   build_pyramid(width, height);
 
   Eigen::Matrix<double, 4, 3> normals;                   // inside where normal . point >= 0
@@ -254,30 +251,29 @@ void Clearance::rank_ends(const std::vector<std::pair<float, int>>& sizes) {
    ranks_.data());
 }
 
-/// Where every voxel within range covers 3 x 3 cells or more, a far end that no 3 x 3 cells around it share
-/// frees none of them. Without these, cubes that hold nothing free are told sooner; the answer for a voxel is
-/// the same, for each cell of what it covers lies in 3 x 3 cells of it.
-void Clearance::drop_lone_ends(int width, int height) {
-  if (parameters_.voxel * std::min(camera_.fx, camera_.fy) < 2 * parameters_.range) return;
-  const cv::Mat ends(height, width, CV_32FC1, ends_.data());
-  scratch_.resize(ends_.size());
-  cv::Mat opened(height, width, CV_32FC1, scratch_.data());
-  cv::morphologyEx(ends, opened, cv::MORPH_OPEN, cv::Mat());
-  ends_.swap(scratch_);
+/// Fills a level from the one below it.
+void Clearance::halve(std::size_t index) {
+  const Level& fine = levels_[index - 1];
+  Level& coarse = levels_[index];
+  const auto nearest = PADE_DISPATCH(halve_nearest, simd::best());
+  const auto most = PADE_DISPATCH(halve_farthest, simd::best());
+  for (int v = 0; v < coarse.height; ++v) {
+    const std::ptrdiff_t above = std::ptrdiff_t{2 * v} * fine.stride;
+    const std::ptrdiff_t below = std::ptrdiff_t{std::min(2 * v + 1, fine.height - 1)} * fine.stride;
+    const std::ptrdiff_t out = std::ptrdiff_t{v} * coarse.stride;
+    nearest(fine.nearest.data() + above, fine.nearest.data() + below, fine.width,
+            coarse.nearest.data() + out);
+    for (std::size_t scale = 0; scale < std::min(index, coarse.farthest.size()); ++scale) {
+      const float* from = farthest(index - 1, scale);
+      most(from + above, from + below, fine.width, coarse.farthest[scale].data() + out);
+    }
+  }
 }
 
-/// Of two by two cells the nearest and the farthest.
-void Clearance::halve(const Level& fine, Level& coarse) const {
-  const std::vector<float>& far = fine.farthest.empty() ? fine.nearest : fine.farthest;
-  for (int v = 0; v < coarse.height; ++v) {
-    const auto row = [&](int y) {
-      return static_cast<std::ptrdiff_t>(std::min(y, fine.height - 1)) * fine.stride;
-    };
-    const auto out = static_cast<std::ptrdiff_t>(v) * coarse.stride;
-    PADE_DISPATCH(halve_row, simd::best())
-    (fine.nearest.data() + row(2 * v), fine.nearest.data() + row(2 * v + 1), far.data() + row(2 * v),
-     far.data() + row(2 * v + 1), fine.width, coarse.nearest.data() + out, coarse.farthest.data() + out);
-  }
+/// A level of the pyramid of the farthest over the nearest in cells of a scale; not below the level of the
+/// scale.
+const float* Clearance::farthest(std::size_t level, std::size_t scale) const {
+  return level == scale ? levels_[level].nearest.data() : levels_[level].farthest[scale].data();
 }
 
 void Clearance::build_pyramid(int width, int height) {
@@ -292,47 +288,50 @@ void Clearance::build_pyramid(int width, int height) {
     level.stride = level.width + kPadding;
     const auto cells = static_cast<std::size_t>(level.stride) * static_cast<std::size_t>(level.height);
     level.nearest.resize(cells);
-    if (i > 0) {
-      level.farthest.resize(cells);
-      halve(levels_[i - 1], level);
-    } else {
-      for (int v = 0; v < height; ++v) {
-        std::copy_n(ends_.begin() + static_cast<std::ptrdiff_t>(v) * width, width,
-                    level.nearest.begin() + static_cast<std::ptrdiff_t>(v) * level.stride);
-      }
+    for (std::size_t scale = 0; scale < std::min(i, level.farthest.size()); ++scale)
+      level.farthest[scale].resize(cells);
+    if (i > 0) halve(i);
+    for (int v = 0; i == 0 && v < height; ++v) {
+      std::copy_n(ends_.begin() + static_cast<std::ptrdiff_t>(v) * width, width,
+                  level.nearest.begin() + static_cast<std::ptrdiff_t>(v) * level.stride);
     }
   }
 }
 
 /// Over the pixels u0..u1 x v0..v1, or a few more (whole cells of the level at which they are at most 4 x 4
-/// cells).
-Clearance::Extremes Clearance::over(int u0, int v0, int u1, int v1) const {
+/// cells): the nearest; and the farthest of the nearest of cells that each voxel down to z_far holds whole.
+Clearance::Extremes Clearance::over(int u0, int v0, int u1, int v1, double z_far) const {
   std::size_t level = 0;
   int extent = std::max(u1 - u0, v1 - v0);
   while (extent > 3 && level + 1 < levels_.size()) {
     extent /= 2;
     ++level;
   }
-  const Level& pyramid = levels_[level];
-  const int shift = static_cast<int>(level);
-  Extremes both{kInfinity, 0};
-  for (int v = v0 >> shift; v <= v1 >> shift; ++v) {
-    const auto start = static_cast<std::ptrdiff_t>(v) * pyramid.stride;
-    const float* near = pyramid.nearest.data() + start;
-    const float* far = level == 0 ? near : pyramid.farthest.data() + start;
-    for (int u = u0 >> shift; u <= u1 >> shift; ++u) {
-      both.nearest = std::min(both.nearest, near[u]);
-      both.farthest = std::max(both.farthest, far[u]);
+  const auto for_each_cell = [&](std::size_t at, const float* cells, const auto& visit) {
+    for (int v = v0 >> at; v <= v1 >> at; ++v) {
+      for (int u = u0 >> at; u <= u1 >> at; ++u) visit(cells[std::ptrdiff_t{v} * levels_[at].stride + u]);
     }
-  }
+  };
+  Extremes both{kInfinity, 0};
+  for_each_cell(level, levels_[level].nearest.data(),
+                [&](float end) { both.nearest = std::min(both.nearest, end); });
+  const bool is_cut = u0 == 0 || v0 == 0 || u1 == camera_.width - 1 || v1 == camera_.height - 1;
+  const double covered = std::min(camera_.fx, camera_.fy) * parameters_.voxel / z_far * (is_cut ? 0.5 : 1.0);
+  const std::size_t scale = std::min(static_cast<std::size_t>(scale_of(covered)), levels_.size() - 1);
+  level = std::max(level, scale);
+  for_each_cell(level, farthest(level, scale),
+                [&](float end) { both.farthest = std::max(both.farthest, end); });
   return both;
 }
 
 LookView Clearance::for_voxels(std::vector<EndsLevel>& levels) const {
   levels.clear();
-  for (const Level& level : levels_) {
-    const std::vector<float>& farthest = level.farthest.empty() ? level.nearest : level.farthest;
-    levels.push_back({level.nearest.data(), farthest.data(), level.stride});
+  for (std::size_t i = 0; i < levels_.size(); ++i) {
+    EndsLevel& level = levels.emplace_back();
+    level.nearest = levels_[i].nearest.data();
+    level.stride = levels_[i].stride;
+    for (std::size_t scale = 0; scale <= std::min<std::size_t>(i, EndsLevel::kScales - 1); ++scale)
+      level.farthest[scale] = farthest(i, scale);
   }
   LookView view{};
   view.f_x = camera_.fx;
@@ -381,9 +380,10 @@ View Clearance::look_at(const Eigen::Vector3d& centre, double side, bool is_voxe
   };
   // NOLINTEND(bugprone-incorrect-roundings)
   const Camera& c = camera_;
-  const Extremes seen = over(
-      first(centre.x() - half.x(), c.fx, c.cx, c.width), first(centre.y() - half.y(), c.fy, c.cy, c.height),
-      last(centre.x() + half.x(), c.fx, c.cx, c.width), last(centre.y() + half.y(), c.fy, c.cy, c.height));
+  const Extremes seen = over(first(centre.x() - half.x(), c.fx, c.cx, c.width),
+                             first(centre.y() - half.y(), c.fy, c.cy, c.height),
+                             last(centre.x() + half.x(), c.fx, c.cx, c.width),
+                             last(centre.y() + half.y(), c.fy, c.cy, c.height), z_far);
   if (seen.farthest <= z_near) return View::nothing;
   const bool before_all = seen.nearest > z_far;
   if (is_voxel) return before_all ? View::free : View::nothing;

@@ -2,6 +2,7 @@
 // it, part of it or nothing of it is free.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -60,8 +61,9 @@ class Clearance {
   struct Level {
     int width = 0;
     int height = 0;
-    int stride = 0;                        // rows are longer, so that eight cells can be read from each
-    std::vector<float> nearest, farthest;  // farthest of the finest level: nearest
+    int stride = 0;  // rows are longer, so that eight cells can be read from each
+    std::vector<float> nearest;
+    std::array<std::vector<float>, EndsLevel::kScales> farthest;  // from the level above its scale on
   };
   /// Neighbouring cells of a row that end before the same depth.
   struct Run {
@@ -82,10 +84,10 @@ class Clearance {
   [[nodiscard]] bool may_close(const Hole& hole, int largest) const;
   void join_above(std::size_t& above, std::size_t begin);
   [[nodiscard]] std::int32_t hole_of(std::int32_t run);
-  void drop_lone_ends(int width, int height);
   void build_pyramid(int width, int height);
-  void halve(const Level& fine, Level& coarse) const;
-  [[nodiscard]] Extremes over(int u0, int v0, int u1, int v1) const;
+  void halve(std::size_t level);
+  [[nodiscard]] const float* farthest(std::size_t level, std::size_t scale) const;
+  [[nodiscard]] Extremes over(int u0, int v0, int u1, int v1, double z_far) const;
 
   Camera camera_;  // of the cells
   Parameters parameters_;

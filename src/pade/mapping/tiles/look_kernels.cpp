@@ -83,33 +83,54 @@ constexpr Eight kBeyond[kRow] = {
 
 /// Cells of a level that hold the pixels of a cube, and a few more: Clearance::over().
 struct Cells {
-  const float* nearest;
-  const float* farthest;
+  const float* first;
   int stride, columns, rows;
 };
 
-[[gnu::always_inline]] inline Cells cells_of(const LookView& view, const Rows& pixels, int i) {
-  const int u0 = pixels.first_u[i];
-  const int v0 = pixels.first_v[i];
-  const int u1 = pixels.last_u[i];
-  const int v1 = pixels.last_v[i];
+[[gnu::always_inline]] inline int level_of(const LookView& view, const Rows& pixels, int i) {
+  const int columns = pixels.last_u[i] - pixels.first_u[i];
+  const int rows = pixels.last_v[i] - pixels.first_v[i];
   int level = 0;
-  for (int extent = u1 - u0 > v1 - v0 ? u1 - u0 : v1 - v0; extent > 3 && level + 1 < view.level_count;
-       extent /= 2)
+  for (int extent = columns > rows ? columns : rows; extent > 3 && level + 1 < view.level_count; extent /= 2)
     ++level;
+  return level;
+}
+
+[[gnu::always_inline]] inline Cells cells_of(const float* cells, int stride, int level, const Rows& pixels,
+                                             int i) {
+  const int u = pixels.first_u[i] >> level;
+  const int v = pixels.first_v[i] >> level;
+  return {cells + v * stride + u, stride, (pixels.last_u[i] >> level) - u + 1,
+          (pixels.last_v[i] >> level) - v + 1};
+}
+
+[[gnu::always_inline]] inline Cells nearest_cells(const LookView& view, const Rows& pixels, int i) {
+  const int level = level_of(view, pixels, i);
   const EndsLevel& ends = view.levels[level];
-  const int at = (v0 >> level) * ends.stride + (u0 >> level);
-  return {ends.nearest + at, ends.farthest + at, ends.stride, (u1 >> level) - (u0 >> level) + 1,
-          (v1 >> level) - (v0 >> level) + 1};
+  return cells_of(ends.nearest, ends.stride, level, pixels, i);
+}
+
+/// Of the scale that each voxel of a cube holds all of a cell of.
+[[gnu::always_inline]] inline Cells farthest_cells(const LookView& view, const Rows& pixels, int i) {
+  const double focal = view.f_x < view.f_y ? view.f_x : view.f_y;
+  const bool is_cut = pixels.first_u[i] == 0 || pixels.first_v[i] == 0 ||
+                      pixels.last_u[i] == view.width - 1 || pixels.last_v[i] == view.height - 1;
+  const double covered = focal * view.voxel / pixels.z_far[i] * (is_cut ? 0.5 : 1.0);
+  int scale = scale_of(covered);
+  if (scale > view.level_count - 1) scale = view.level_count - 1;
+  int level = level_of(view, pixels, i);
+  if (level < scale) level = scale;
+  const EndsLevel& ends = view.levels[level];
+  return cells_of(ends.farthest[scale], ends.stride, level, pixels, i);
 }
 
 /// Nearest of the cells: of at most five columns.
 [[gnu::always_inline]] inline float nearest_of(const Cells& cells) {
   Eight least;
-  __builtin_memcpy(&least, cells.nearest, sizeof least);
+  __builtin_memcpy(&least, cells.first, sizeof least);
   for (int v = 1; v < cells.rows; ++v) {
     Eight next;
-    __builtin_memcpy(&next, cells.nearest + v * cells.stride, sizeof next);
+    __builtin_memcpy(&next, cells.first + v * cells.stride, sizeof next);
     least = next < least ? next : least;
   }
   least += kBeyond[cells.columns];
@@ -120,22 +141,16 @@ struct Cells {
 
 [[gnu::always_inline]] inline float farthest_of(const Cells& cells) {
   Eight most;
-  __builtin_memcpy(&most, cells.farthest, sizeof most);
+  __builtin_memcpy(&most, cells.first, sizeof most);
   for (int v = 1; v < cells.rows; ++v) {
     Eight next;
-    __builtin_memcpy(&next, cells.farthest + v * cells.stride, sizeof next);
+    __builtin_memcpy(&next, cells.first + v * cells.stride, sizeof next);
     most = next > most ? next : most;
   }
   most -= kBeyond[cells.columns];
   float farthest = most[0];
   for (int k = 1; k < 5; ++k) farthest = most[k] > farthest ? most[k] : farthest;
   return farthest;
-}
-
-/// Whether all pixels, or a few more, end behind z_far.
-[[gnu::always_inline]] inline bool is_before_all(const LookView& view, const Rows& pixels, int i) {
-  const Cells cells = cells_of(view, pixels, i);
-  return cells.nearest[0] > pixels.z_far[i] && nearest_of(cells) > pixels.z_far[i];
 }
 
 }  // namespace
@@ -201,14 +216,20 @@ void look_at_eight(const LookView& view, const double* corners, unsigned* free, 
   }
   unsigned all = 0;
   unsigned none = 0;
+  Cells near_cells[kRow];  // NOLINT(*-avoid-c-arrays)
+  Cells far_cells[kRow];   // NOLINT(*-avoid-c-arrays)
+  for (int i = 0; i < kRow; ++i) {
+    if (pixels.is_seen[i] == 0) continue;
+    near_cells[i] = nearest_cells(view, pixels, i);
+    far_cells[i] = farthest_cells(view, pixels, i);
+  }
   for (int i = 0; i < kRow; ++i) {
     const unsigned bit = 1U << i;
     if (is_out[i] != 0) none |= bit;
     if (pixels.is_seen[i] == 0) continue;
-    const Cells cells = cells_of(view, pixels, i);
-    if (farthest_of(cells) <= z_nears[i]) {
+    if (farthest_of(far_cells[i]) <= z_nears[i]) {
       none |= bit;
-    } else if (is_whole[i] != 0 && nearest_of(cells) > pixels.z_far[i]) {
+    } else if (is_whole[i] != 0 && nearest_of(near_cells[i]) > pixels.z_far[i]) {
       all |= bit;
     }
   }
@@ -223,9 +244,20 @@ std::uint64_t free_voxels(const LookView& view, const VoxelCentres& centres, std
     if (eight == 0) continue;
     Rows rows;
     project(view, centres.x + 8 * j, centres.y + 8 * j, centres.z + 8 * j, rows);
+    // All cells are asked for before the first is looked at: they are spread over more memory than is near.
+    Cells cells[kRow];  // NOLINT(*-avoid-c-arrays)
+    unsigned seen = 0;
     for (unsigned rest = eight; rest != 0; rest &= rest - 1) {
       const int i = __builtin_ctz(rest);
-      if (rows.is_seen[i] != 0 && is_before_all(view, rows, i)) free |= std::uint64_t{1} << (8 * j + i);
+      if (rows.is_seen[i] == 0) continue;
+      seen |= 1U << i;
+      cells[i] = nearest_cells(view, rows, i);
+      __builtin_prefetch(cells[i].first);
+    }
+    for (; seen != 0; seen &= seen - 1) {
+      const int i = __builtin_ctz(seen);
+      if (cells[i].first[0] > rows.z_far[i] && nearest_of(cells[i]) > rows.z_far[i])
+        free |= std::uint64_t{1} << (8 * j + i);
     }
   }
   return free;
@@ -259,55 +291,18 @@ void rank_all(const float* values, int count, const float* depths, int depth_cou
   }
 }
 
-void halve_row(const float* near_a, const float* near_b, const float* far_a, const float* far_b, int width,
-               float* nearest, float* farthest) {
-  const auto least = [](float a, float b) { return b < a ? b : a; };
-  const auto most = [](float a, float b) { return b > a ? b : a; };
-  const int pairs = width / 2;
-  for (int u = 0; u < pairs; ++u) {
-    nearest[u] = least(least(near_a[2 * u], near_a[2 * u + 1]), least(near_b[2 * u], near_b[2 * u + 1]));
-    farthest[u] = most(most(far_a[2 * u], far_a[2 * u + 1]), most(far_b[2 * u], far_b[2 * u + 1]));
-  }
-  if (width % 2 != 0) {
-    nearest[pairs] = least(near_a[width - 1], near_b[width - 1]);
-    farthest[pairs] = most(far_a[width - 1], far_b[width - 1]);
-  }
+void halve_nearest(const float* a, const float* b, int width, float* out) {
+  const auto least = [](float x, float y) { return y < x ? y : x; };
+  for (int u = 0; u < width / 2; ++u)
+    out[u] = least(least(a[2 * u], a[2 * u + 1]), least(b[2 * u], b[2 * u + 1]));
+  if (width % 2 != 0) out[width / 2] = least(a[width - 1], b[width - 1]);
 }
 
-void usable_depths(const DepthRow& row, double farthest, double limit, double spread, double* z,
-                   int* uncertain, int* to_spread) {
-  int fails = 0;
-  int spreads = 0;
-  for (int u = 0; u < row.count; ++u) {
-    const double depth = row.depth[u];
-    const bool is_near = (depth > 0) & (depth <= farthest) & (row.state == nullptr || row.state[u] == 0);
-    const bool is_certain = row.variance == nullptr || row.variance[u] <= limit * depth * depth;
-    const bool is_usable = is_near & is_certain;
-    fails += is_near & !is_certain;
-    spreads += is_usable & (row.own_variance != nullptr && row.own_variance[u] > spread);
-    z[u] = is_usable ? depth : __builtin_nan("");
-  }
-  *uncertain = fails;
-  *to_spread = spreads;
-}
-
-void place_row(const PixelRays& rays, const double* z, int count, std::uint64_t* keys) {
-  constexpr double kCentre = 32768;
-  constexpr double kAll = 65536;
-  for (int u = 0; u < count; ++u) {
-    const bool is_point = z[u] == z[u];
-    double index[3];  // NOLINT(*-avoid-c-arrays)
-    for (int axis = 0; axis < 3; ++axis) {
-      index[axis] =
-          rays.per_voxel * (rays.origin[axis] + z[u] * (rays.start[axis] + u * rays.step[axis])) + kCentre;
-    }
-    const bool is_inside = (index[0] >= 0) & (index[0] < kAll) & (index[1] >= 0) & (index[1] < kAll) &
-                           (index[2] >= 0) & (index[2] < kAll);
-    const std::uint64_t x = static_cast<std::uint32_t>(static_cast<int>(is_inside ? index[0] : 0));
-    const std::uint64_t y = static_cast<std::uint32_t>(static_cast<int>(is_inside ? index[1] : 0));
-    const std::uint64_t w = static_cast<std::uint32_t>(static_cast<int>(is_inside ? index[2] : 0));
-    keys[u] = is_inside ? x | y << 16 | w << 32 : is_point ? kPointOutside : kNoPoint;
-  }
+void halve_farthest(const float* a, const float* b, int width, float* out) {
+  const auto most = [](float x, float y) { return y > x ? y : x; };
+  for (int u = 0; u < width / 2; ++u)
+    out[u] = most(most(a[2 * u], a[2 * u + 1]), most(b[2 * u], b[2 * u + 1]));
+  if (width % 2 != 0) out[width / 2] = most(a[width - 1], b[width - 1]);
 }
 
 }  // namespace pade::mapping::PADE_ISA

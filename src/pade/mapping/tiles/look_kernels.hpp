@@ -15,12 +15,19 @@ struct VoxelCentres {
   double z[64];  // NOLINT(*-avoid-c-arrays)
 };
 
-/// A level of the pyramid over the free ends of the rays.
+/// A level of the pyramid over the free ends of the rays: cells of 2^level x 2^level pixels.
 struct EndsLevel {
-  const float* nearest = nullptr;   ///< of each cell; readable for eight cells from each
-  const float* farthest = nullptr;  ///< likewise
-  int stride = 0;                   ///< cells from row to row
+  /// Pyramids of the farthest: of pixels, and of the nearest in cells of 2 x 2, 4 x 4 and 8 x 8 pixels.
+  static constexpr int kScales = 4;
+  const float* nearest = nullptr;  ///< of each cell; readable for eight cells from each
+  const float* farthest[kScales] =
+      {};          ///< likewise; null below the level of their cells NOLINT(*-avoid-c-arrays)
+  int stride = 0;  ///< cells from row to row
 };
+
+/// A voxel that covers so many pixels along each axis holds all of a cell of 2^scale x 2^scale: where the
+/// nearest of each cell lies before it, it is not free.
+inline int scale_of(double pixels) { return pixels >= 15 ? 3 : pixels >= 7 ? 2 : pixels >= 3 ? 1 : 0; }
 
 /// What of a Clearance the kernel needs.
 struct LookView {
@@ -89,7 +96,7 @@ PADE_DECLARE_KERNEL(
     /// Of each value how many of the depths, which ascend, it reaches: below 128. NaN reaches none.
     void rank_all(const float* values, int count, const float* depths, int depth_count, unsigned char* ranks);
     /// Nearest and farthest of 2 x 2 cells of two rows of `width` cells, which may be the same row.
-    void halve_row(const float* near_a, const float* near_b, const float* far_a, const float* far_b,
-                   int width, float* nearest, float* farthest))
+    void halve_nearest(const float* a, const float* b, int width, float* out);
+    void halve_farthest(const float* a, const float* b, int width, float* out))
 
 }  // namespace pade::mapping
