@@ -305,4 +305,40 @@ void halve_farthest(const float* a, const float* b, int width, float* out) {
   if (width % 2 != 0) out[width / 2] = most(a[width - 1], b[width - 1]);
 }
 
+void usable_depths(const DepthRow& row, double farthest, double limit, double spread, double* z,
+                   int* uncertain, int* to_spread) {
+  int fails = 0;
+  int spreads = 0;
+  for (int u = 0; u < row.count; ++u) {
+    const double depth = row.depth[u];
+    const bool is_near = (depth > 0) & (depth <= farthest) & (row.state == nullptr || row.state[u] == 0);
+    const bool is_certain = row.variance == nullptr || row.variance[u] <= limit * depth * depth;
+    const bool is_usable = is_near & is_certain;
+    fails += is_near & !is_certain;
+    spreads += is_usable & (row.own_variance != nullptr && row.own_variance[u] > spread);
+    z[u] = is_usable ? depth : __builtin_nan("");
+  }
+  *uncertain = fails;
+  *to_spread = spreads;
+}
+
+void place_row(const PixelRays& rays, const double* z, int count, std::uint64_t* keys) {
+  constexpr double kCentre = 32768;
+  constexpr double kAll = 65536;
+  for (int u = 0; u < count; ++u) {
+    const bool is_point = z[u] == z[u];
+    double index[3];  // NOLINT(*-avoid-c-arrays)
+    for (int axis = 0; axis < 3; ++axis) {
+      index[axis] =
+          rays.per_voxel * (rays.origin[axis] + z[u] * (rays.start[axis] + u * rays.step[axis])) + kCentre;
+    }
+    const bool is_inside = (index[0] >= 0) & (index[0] < kAll) & (index[1] >= 0) & (index[1] < kAll) &
+                           (index[2] >= 0) & (index[2] < kAll);
+    const std::uint64_t x = static_cast<std::uint32_t>(static_cast<int>(is_inside ? index[0] : 0));
+    const std::uint64_t y = static_cast<std::uint32_t>(static_cast<int>(is_inside ? index[1] : 0));
+    const std::uint64_t w = static_cast<std::uint32_t>(static_cast<int>(is_inside ? index[2] : 0));
+    keys[u] = is_inside ? x | y << 16 | w << 32 : is_point ? kPointOutside : kNoPoint;
+  }
+}
+
 }  // namespace pade::mapping::PADE_ISA
