@@ -141,5 +141,21 @@ TEST(BaselineWindow, AStepThatTheImagesContradictCountsForLittle) {
   EXPECT_NEAR(window.length(), 0.1, 0.002);
 }
 
+/// A step that GPS/INS and the steps before contradict is a surprise; one within their errors is none.
+TEST(BaselineWindow, IsSurprisedByALengthThatNobodyElseHas) {
+  Flight flight(8);
+  Random random(7);
+  constexpr double kSigma = 0.003;
+  for (int i = 0; i < 8; ++i)
+    flight.fly(0.1, 0.1 + kSigma * random.normal(), kSigma, 0.003 * random.normal(), 4);
+  const RelativeMotion given = step(0.05 * kForward, kSigma);
+  EXPECT_LT(flight.window.surprise(given, kForward, {0.052, 1e-4, 4}), 4);
+  EXPECT_GT(flight.window.surprise(given, kForward, {0.025, 1e-4, 4}), 25);
+  EXPECT_GT(flight.window.surprise(given, kForward, {0.09, 1e-4, 4}), 25);
+  // GPS/INS that knows nothing of the length contradicts nothing.
+  EXPECT_LT(flight.window.surprise(step(0.05 * kForward, 0.1), kForward, {0.025, 1e-4, 4}), 1);
+  EXPECT_EQ(BaselineWindow(8).surprise(given, kForward, {0.025, 1e-4, 4}), 0);
+}
+
 }  // namespace
 }  // namespace pade::depth

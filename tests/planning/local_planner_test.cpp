@@ -203,5 +203,42 @@ TEST(LocalPlanner, RefusesOptionsThatMakeNoSense) {
   EXPECT_NE(planner.error().message.find("vehicle.radius"), std::string::npos) << planner.error().message;
 }
 
+/// Free within a ball, unknown beyond.
+class Bubble : public FreeSpace {
+ public:
+  [[nodiscard]] double clear_length(std::span<const Vector3d> path, double radius, bool) const override {
+    constexpr double kRadius = 1.5;
+    double length = 0;
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      if (i > 0) length += (path[i] - path[i - 1]).norm();
+      if ((path[i] - Vector3d(0, 0, 1.6)).norm() + radius > kRadius) return length;
+    }
+    return kInfinity;
+  }
+};
+
+/// What gets no farther by flying on hops to the sides, for another look: never out of what is free.
+TEST(LocalPlanner, HopsToTheSidesWhereItGetsNowhere) {
+  const Bubble space;
+  LocalPlanner planner = planner_of();
+  MotionState state = at_rest({0, 0, 1.6});
+  double farthest = 0;
+  double least = 0;
+  double greatest = 0;
+  int hops = 0;
+  for (int frame = 0; frame < 80; ++frame) {
+    const LocalPlan& plan = planner.plan(state, {30, 0, 1.6}, space, unseen_window(state.position));
+    hops += plan.kind == PlanKind::recovering ? 1 : 0;
+    state = state_at(plan.motion, state.time + 0.1);
+    farthest = std::max(farthest, state.position.x());
+    least = std::min(least, state.position.y());
+    greatest = std::max(greatest, state.position.y());
+    EXPECT_LE((state.position - Vector3d(0, 0, 1.6)).norm() + 0.4, 1.5 + 1e-6) << frame;
+  }
+  EXPECT_GT(farthest, 0.7);
+  EXPECT_GT(hops, 5);
+  EXPECT_GT(greatest - least, 0.25);
+}
+
 }  // namespace
 }  // namespace pade::planning

@@ -92,12 +92,14 @@ bool straight_way_is_free(const FlightTask& task, double radius) {
   return true;
 }
 
-/// Every tenth of a second.
-std::vector<Vector3d> track_of(const FlightRecord& flight, const Pose& T_view_world) {
+/// Every tenth of a second from a time on, s.
+std::vector<Vector3d> track_of(const FlightRecord& flight, double from, const Pose& T_view_world) {
   constexpr std::size_t kEvery = 10;
   std::vector<Vector3d> points;
-  for (std::size_t i = 0; i < flight.samples.size(); i += kEvery)
-    points.push_back(T_view_world * flight.samples[i].state.position);
+  for (std::size_t i = 0; i < flight.samples.size(); i += kEvery) {
+    const planning::MotionState& state = flight.samples[i].state;
+    if (state.time >= from) points.push_back(T_view_world * state.position);
+  }
   return points;
 }
 
@@ -149,7 +151,7 @@ std::string flight_page(const ordered_json& whole, const FlightTask& task, const
   for (const std::string& event : record.events)
     body += fmt::format("<p class=\"warning\">{}</p>\n", evaluation::escape_html(event));
   const Pose T_view_world = record.T_world_map.inverse();
-  const std::vector<Vector3d> points = track_of(flight, T_view_world);
+  const std::vector<Vector3d> points = track_of(flight, record.climbed, T_view_world);
   const std::array corners = {T_view_world * task.start, T_view_world * task.goal};
   constexpr double kFasterBy = 4;
   if (record.view && !points.empty()) {
@@ -161,7 +163,7 @@ std::string flight_page(const ordered_json& whole, const FlightTask& task, const
     body +=
         evaluation::route_picture(*record.view, points, corners,
                                   whole["made_of"]["options"]["planner"]["vehicle"]["radius"].get<double>(),
-                                  flight.duration / kFasterBy);
+                                  (flight.duration - record.climbed) / kFasterBy);
     body += "</div>\n";
   }
   body += "<h2>Over time</h2>\n<div class=\"views\">";

@@ -50,6 +50,7 @@ simulation::FrameOptions frame_options(const ChainFlightOptions& options, std::u
   constexpr double kBlur = 0.01;  // s
   simulation::FrameOptions frame;
   frame.image = options.image;
+  frame.render = options.render;
   frame.exposure_time = options.fault.kind == Fault::motion_blur ? kBlur : options.exposure_time;
   frame.seed = seed;
   return frame;
@@ -111,7 +112,9 @@ class ChainLoop {
   double climbed_ = 0;  // s
   Vector3d ground_ = Vector3d::Zero(), map_start_ = Vector3d::Zero(),
            goal_ = Vector3d::Zero();           // goal: as navigation has the world
-  std::optional<std::pair<Time, Pose>> last_;  // frame that the mapper has taken
+  std::optional<std::pair<Time, Pose>> last_;  // frame, as navigation has it
+  Matrix6d since_taken_ = Matrix6d::Zero();    // of the motion to it from the last one that the mapper took
+  std::string skipped_;                        // why the last one was
   Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
   double last_depth_ = 0;
   cv::Mat frozen_, image_;
@@ -182,7 +185,7 @@ bool ChainLoop::place(Time stamp, Pose& pose, Matrix6d& covariance) {
   if (step.answer != navigation::Answer::valid) return false;
   pose =
       last_->second * Pose{Eigen::Quaterniond(step.motion.R_reference_other), step.motion.t_reference_other};
-  covariance = step.motion.covariance;
+  covariance = since_taken_ + step.motion.covariance;
   return true;
 }
 
@@ -207,7 +210,10 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
   const MapperUpdate& update = mapper_.add(image, stamp, pose, covariance);
   out.outcome = update.outcome;
   if (update.outcome == MapperUpdate::Outcome::skipped) {
-    say("frame skipped: " + update.reason);
+    if (skipped_.empty() || skipped_ != update.reason) say("frame skipped: " + update.reason);
+    skipped_ = update.reason;
+    last_ = {stamp, pose};  // the chain goes on
+    since_taken_ = covariance;
     return;
   }
   if (last_) {
@@ -215,6 +221,8 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
     out.step = (mapper_.T_world_camera().translation - placed_).norm();
   }
   placed_ = mapper_.T_world_camera().translation;
+  since_taken_.setZero();
+  skipped_.clear();
   last_ = {stamp, pose};
   update_ = &update;
   anchor(stamp);
@@ -303,8 +311,9 @@ void ChainLoop::frame() {
 
 Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>& observer) {
   const auto finish = [&](Outcome outcome) -> Result<ChainRecord> {
-    record_.flight = watch_.finished(outcome);
+    record_.flight = watch_.finished(outcome, climbed_);
     record_.view = view_;
+    record_.climbed = climbed_;
     record_.mapper = std::make_shared<ObstacleMapper>(std::move(mapper_));
     for (const ChainFrame& f : record_.frames) record_.seconds_blind += f.blind ? 1 / options_.frame_rate : 0;
     return std::move(record_);

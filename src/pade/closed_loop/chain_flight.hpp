@@ -17,6 +17,7 @@
 #include "pade/pipeline/obstacle_mapper.hpp"
 #include "pade/planning/local_planner.hpp"
 #include "pade/simulation/render/image_formation.hpp"
+#include "pade/simulation/render/renderer.hpp"
 
 namespace pade::closed_loop {
 
@@ -25,6 +26,7 @@ struct ChainFlightOptions {
   ObstacleMapperOptions mapper = outdoors();
   NavigatedVehicleOptions vehicle;
   simulation::ImageOptions image;
+  simulation::RenderOptions render;
   FaultOptions fault;
   double frame_rate = 10;     ///< Hz; a plan takes effect one frame after its image
   double time_limit = 120;    ///< s in the air
@@ -41,6 +43,7 @@ struct ChainFlightOptions {
     field("mapper", self.mapper, "depth and map");
     field("vehicle", self.vehicle, "motion, instruments and navigation");
     field("image", self.image, "what the sensor makes of the light");
+    field("render", self.render, "how the light is drawn");
     field("fault", self.fault, "what goes wrong on purpose");
     field("frame_rate", self.frame_rate, "Hz");
     field("time_limit", self.time_limit, "s in the air");
@@ -86,6 +89,7 @@ struct ChainRecord {
   std::shared_ptr<const mapping::MapView> view;  ///< of the map at the end, in the map's world
   std::shared_ptr<const ObstacleMapper> mapper;  ///< at the end
   Pose T_world_map;                              ///< at take-off
+  double climbed = 0;                            ///< s, when it was at the height of the start
   double seconds_blind = 0;                      ///< s
 };
 

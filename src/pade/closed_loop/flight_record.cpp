@@ -46,12 +46,14 @@ double FlightWatch::goal_distance() const {
   return (at - task_.goal).head<2>().norm();
 }
 
-FlightRecord FlightWatch::finished(Outcome outcome) {
+FlightRecord FlightWatch::finished(Outcome outcome, double from) {
   record_.outcome = collided_ ? Outcome::collided : outcome;
   record_.goal_distance = goal_distance();
   record_.least_clearance = kFarthest;
-  for (const FlightSample& sample : record_.samples)
-    record_.least_clearance = std::min(record_.least_clearance, sample.clearance);
+  for (const FlightSample& sample : record_.samples) {
+    if (sample.state.time >= from || collided_)
+      record_.least_clearance = std::min(record_.least_clearance, sample.clearance);
+  }
   if (record_.samples.empty()) return std::move(record_);
   record_.duration = record_.samples.back().state.time;
   const double made_good =

@@ -81,7 +81,8 @@ class FlightWatch {
   [[nodiscard]] double goal_distance() const;
   void add(const FlightPlan& plan) { record_.plans.push_back(plan); }
   /// Ends the flight. A collision that was seen stays one.
-  FlightRecord finished(Outcome outcome);
+  /// @param from  s: the least clearance is of the time from here on, unless it collides before
+  FlightRecord finished(Outcome outcome, double from = 0);
 
  private:
   const FlightTask& task_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -93,6 +94,13 @@ bool many_views(const ObstacleMapperOptions& o) {
 
 constexpr double kScaleDrift = 1e-5;  // variance of the logarithm, from frame to frame
 constexpr double kLengthGate = 16;    // four sigmas
+
+bool is_same(const cv::Mat& a, const cv::Mat& b) {
+  for (int v = 0; v < a.rows; ++v) {
+    if (std::memcmp(a.ptr(v), b.ptr(v), static_cast<std::size_t>(a.cols)) != 0) return false;
+  }
+  return true;
+}
 
 /// What an alignment says of the length of the step.
 std::optional<depth::BaselineWindow::Seen> length_seen(const depth::AlignedMotion& aligned, int steps) {
@@ -227,6 +235,12 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
   {
     const Stopwatch watch(update_, Stage::grey);
     newest.frame.image = to_grey(image);
+  }
+  if (!recent_.empty() && is_same(newest.frame.image, recent_.last().frame.image)) {
+    update_.reason = "the image is the same as the one before, to the last bit: the camera hangs";
+    update_.outcome = MapperUpdate::Outcome::skipped;
+    ++health_.skipped;
+    return update_;
   }
   update_.outcome = MapperUpdate::Outcome::waiting;
   if (recent_.size() >= options_.step) {

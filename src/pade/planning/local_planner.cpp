@@ -238,7 +238,7 @@ const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& goa
     return plan_;
   }
   standing_since_ = -1;
-  if (stuck && from.velocity.norm() < kCrawl) hop(task);
+  if (stuck) hop(task);
   return plan_;
 }
 

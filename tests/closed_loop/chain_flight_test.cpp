@@ -1,0 +1,117 @@
+#include "pade/closed_loop/chain_flight.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace pade::closed_loop {
+namespace {
+
+using Eigen::Vector3d;
+using namespace pade::simulation;
+
+struct Place {
+  Scene scene;
+  SurfaceDistance surface;
+};
+
+/// Textured columns on textured ground under a blank sky.
+Place columns(const std::vector<Eigen::Vector2d>& at) {
+  World world;
+  Material stone;
+  stone.pattern.kind = PatternKind::gravel;
+  world.visuals.push_back({"ground", {}, Rectangle{Vector3d::UnitZ(), {200, 200}}, stone, true});
+  for (const auto& p : at)
+    world.visuals.push_back(
+        {"column", {Eigen::Quaterniond::Identity(), {p.x(), p.y(), 2}}, Cylinder{0.3, 4}, stone, true});
+  auto scene = Scene::build(std::move(world));
+  EXPECT_TRUE(scene.ok());
+  auto surface = SurfaceDistance::build(*scene);
+  EXPECT_TRUE(surface.ok());
+  return {std::move(scene).value(), std::move(surface).value()};
+}
+
+ChainFlightOptions quick() {
+  ChainFlightOptions options;
+  options.width = 320;
+  options.render = RenderOptions::preview();
+  options.time_limit = 30;
+  return options;
+}
+
+ChainRecord flown(const Place& place, double way, const ChainFlightOptions& options) {
+  auto record = fly_chain({place.scene, place.surface, {0, 0, 1.6}, {way, 0, 1.6}, 3}, options);
+  EXPECT_TRUE(record.ok());
+  return std::move(record).value();
+}
+
+TEST(ChainFlight, FliesAroundColumnsOnWhatItsCameraAndInstrumentsTellIt) {
+  const Place place = columns({{5, 0.2}, {7, -2}});
+  const ChainRecord record = flown(place, 9.5, quick());
+  EXPECT_EQ(record.flight.outcome, Outcome::arrived);
+  EXPECT_GT(record.flight.least_clearance, 0.35);
+  EXPECT_LT(record.flight.goal_distance, 2.5);
+  EXPECT_GT(record.flight.goal_velocity, 0.35);
+  EXPECT_EQ(record.seconds_blind, 0);
+  std::size_t mapped = 0;
+  for (const ChainFrame& frame : record.frames) {
+    mapped += frame.outcome == MapperUpdate::Outcome::mapped ? 1 : 0;
+    EXPECT_LT(frame.drift, 0.5);
+    EXPECT_NEAR(frame.drift, frame.drift, 0);  // finite
+  }
+  EXPECT_EQ(mapped, record.frames.size() - 1);
+  // The column that stood in the way is in the map, in the world in which it was found.
+  bool found = false;
+  for (double z = 1; z < 2; z += 0.1) {
+    for (double y = -0.4; y < 0.9; y += 0.1) {
+      const Vector3d place_in_map = record.T_world_map.inverse() * Vector3d(4.7, y, z);
+      found = found || record.view->in_ball(place_in_map, 0.25).occupied > 0;
+    }
+  }
+  EXPECT_TRUE(found);
+}
+
+/// A camera that hangs shows the same image again: that must never look like empty space.
+TEST(ChainFlight, AFrozenCameraStopsItInTime) {
+  const Place place = columns({{6, 0.1}, {6, -1.2}, {6, 1.4}});
+  ChainFlightOptions options = quick();
+  options.time_limit = 7;
+  options.fault.kind = Fault::frozen_camera;
+  options.fault.from = 3.5;
+  options.fault.duration = 100;
+  const ChainRecord record = flown(place, 14, options);
+  EXPECT_EQ(record.flight.outcome, Outcome::timed_out);
+  EXPECT_GT(record.flight.least_clearance, 0.35);
+  EXPECT_GT(record.seconds_blind, 2.5);
+  EXPECT_LT(record.flight.samples.back().state.velocity.norm(), 0.2);
+}
+
+TEST(ChainFlight, TheSameFlightHasTheSameBits) {
+  const Place place = columns({{5, 0.1}});
+  ChainFlightOptions options = quick();
+  options.time_limit = 2.8;
+  const ChainRecord a = flown(place, 8, options);
+  const ChainRecord b = flown(place, 8, options);
+  ASSERT_EQ(a.flight.samples.size(), b.flight.samples.size());
+  for (std::size_t i = 0; i < a.flight.samples.size(); ++i)
+    EXPECT_EQ(a.flight.samples[i].state.position, b.flight.samples[i].state.position);
+}
+
+TEST(ChainFlight, RefusesOptionsThatMakeNoSense) {
+  const Place place = columns({});
+  const auto refused = [&](const ChainFlightOptions& options) {
+    return !fly_chain({place.scene, place.surface, {0, 0, 1.6}, {9, 0, 1.6}, 1}, options).ok();
+  };
+  ChainFlightOptions speed = quick();
+  speed.planner.vehicle.speed = 0;
+  EXPECT_TRUE(refused(speed));
+  ChainFlightOptions rate = quick();
+  rate.frame_rate = 0;
+  EXPECT_TRUE(refused(rate));
+  ChainFlightOptions mapper = quick();
+  mapper.mapper.flow = "none";
+  EXPECT_TRUE(refused(mapper));
+}
+
+}  // namespace
+}  // namespace pade::closed_loop
