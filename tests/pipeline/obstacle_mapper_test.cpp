@@ -344,6 +344,21 @@ TEST(ObstacleMapper, HoverMeasuresNothingAndTheFlightGoesOn) {
   }
 }
 
+/// Images that stay the same while the pose moves would look like a world without end: they are not used.
+TEST(ObstacleMapper, ACameraThatHangsIsNotBelieved) {
+  const ForwardFlight& f = forward();
+  auto m = std::move(ObstacleMapper::create(f.scene.camera)).value();
+  for (std::size_t k = 0; k < 3; ++k) m.add(f.images[k], f.scene.times[k], f.scene.T_world_camera[k]);
+  for (std::size_t k = 3; k < 5; ++k) {
+    const MapperUpdate& hung = m.add(f.images[2], f.scene.times[k], f.scene.T_world_camera[k]);
+    EXPECT_EQ(hung.outcome, MapperUpdate::Outcome::skipped);
+    EXPECT_NE(hung.reason.find("hangs"), std::string::npos);
+  }
+  EXPECT_EQ(m.health().skipped, 2U);
+  EXPECT_EQ(m.add(f.images[5], f.scene.times[5], f.scene.T_world_camera[5]).outcome,
+            MapperUpdate::Outcome::mapped);
+}
+
 TEST(ObstacleMapper, OnePairIsWhatThePaperKnows) {
   const ForwardFlight& f = forward();
   const ObstacleMapperOptions options = one_pair();

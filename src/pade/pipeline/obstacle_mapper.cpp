@@ -95,7 +95,14 @@ bool many_views(const ObstacleMapperOptions& o) {
 constexpr double kScaleDrift = 1e-5;  // variance of the logarithm, from frame to frame
 constexpr double kLengthGate = 16;    // four sigmas
 
-bool is_same(const cv::Mat& a, const cv::Mat& b) {
+/// The pose has moved, the image is the same.
+bool hangs(const TrackedFrame& newest, const TrackedFrame& last) {
+  constexpr double kMoved = 0.005;   // m
+  constexpr double kTurned = 0.001;  // rad
+  const Pose motion = last.given.inverse() * newest.given;
+  if (motion.translation.norm() < kMoved && rotation_log(motion.rotation).norm() < kTurned) return false;
+  const cv::Mat& a = newest.frame.image;
+  const cv::Mat& b = last.frame.image;
   for (int v = 0; v < a.rows; ++v) {
     if (std::memcmp(a.ptr(v), b.ptr(v), static_cast<std::size_t>(a.cols)) != 0) return false;
   }
@@ -236,8 +243,8 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     const Stopwatch watch(update_, Stage::grey);
     newest.frame.image = to_grey(image);
   }
-  if (!recent_.empty() && is_same(newest.frame.image, recent_.last().frame.image)) {
-    update_.reason = "the image is the same as the one before, to the last bit: the camera hangs";
+  if (!recent_.empty() && hangs(newest, recent_.last())) {
+    update_.reason = "the camera has moved, but the image is that of before to the last bit: it hangs";
     update_.outcome = MapperUpdate::Outcome::skipped;
     ++health_.skipped;
     return update_;

@@ -327,7 +327,9 @@ class AccuracyJudge {
     Verdict verdict;
     verdict.claim = "PADE may serve safe autonomous flight in unknown places";
     verdict.where = "abstract";
-    verdict.sense = "An outlook, not a measurement: nothing is flown by the map here.";
+    verdict.sense =
+        "An outlook: `pade experiment` flies nothing. `pade fly` does, by the chain that stands on it "
+        "(docs/fly.md).";
     return verdict;
   }
 
