@@ -27,7 +27,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-const Camera kSmall = simulation::analytic_camera(128, 96);
+const Camera kSmallCamera = simulation::analytic_camera(128, 96);
 
 struct Leaf {
   std::uint64_t code;
@@ -88,8 +88,8 @@ class Pair {
   tree::TreeMap theirs_;
 };
 
-simulation::AnalyticFlight tilted(const char* name, int frames) {
-  simulation::AnalyticFlight flight = *simulation::make_analytic_flight(name, frames, kSmall);
+simulation::AnalyticFlight tilted_flight(const char* name, int frames) {
+  simulation::AnalyticFlight flight = *simulation::make_analytic_flight(name, frames, kSmallCamera);
   for (Pose& pose : flight.T_world_camera) {
     pose.rotation = pose.rotation * rotation_exp({0.11, -0.07, 0.13});
     pose.translation += Vector3d(0.0123, 0.0456, 0.0371);
@@ -117,12 +117,12 @@ TEST(TreeAgreement, FlightsGiveTheSameLogOddsBitForBit) {
         MapOptions options;
         options.looks_baseline = baseline;
         Pair pair(options);
-        const auto flight = tilted(name, 6);
+        const auto flight = tilted_flight(name, 6);
         for (int k = 0; k < 8; ++k) {
           const auto i = static_cast<std::size_t>(k % 6);
           DepthImage image = depth_image(flight, i, k % 3 == 0 ? 0.05 : 0.01);
           if (has_bounds) add_bounds(image, random);
-          pair.integrate(image, kSmall, flight.T_world_camera[i]);
+          pair.integrate(image, kSmallCamera, flight.T_world_camera[i]);
         }
         EXPECT_GT(pair.compare(), 3000U) << name << " " << has_bounds << " " << baseline;
       }
@@ -146,8 +146,8 @@ TEST(TreeAgreement, ImagesPosesAndOptionsAtRandomGiveTheSameLogOddsBitForBit) {
     for (int k = 0; k < 8; ++k) {
       DepthImage image;
       image.window = static_cast<int>(1 + random() % 4);
-      const int height = (kSmall.height + image.window - 1) / image.window;
-      const int width = (kSmall.width + image.window - 1) / image.window;
+      const int height = (kSmallCamera.height + image.window - 1) / image.window;
+      const int width = (kSmallCamera.width + image.window - 1) / image.window;
       image.depth.create(height, width, CV_32FC1);
       const double base = 2 + 6 * (1 + unit(random));
       const double slope = 0.03 * image.window * unit(random);
@@ -166,14 +166,14 @@ TEST(TreeAgreement, ImagesPosesAndOptionsAtRandomGiveTheSameLogOddsBitForBit) {
       pose.rotation = rotation_exp({0.3 * unit(random), 0.3 * unit(random), 3 * unit(random)});
       pose.translation = seed % 5 == 0 ? Vector3d(32767 * options.voxel, 0, 0)
                                        : Vector3d(0.2 * k, unit(random), unit(random));
-      pair.integrate(image, kSmall, pose);
+      pair.integrate(image, kSmallCamera, pose);
     }
     pair.compare();
   }
 }
 
 TEST(TreeAgreement, ATreeThatIsTakenOverComesBackAsItWas) {
-  const auto flight = tilted("courtyard", 4);
+  const auto flight = tilted_flight("courtyard", 4);
   const OccupancyMap map = map_of(flight, 0.01);
   const OccupancyMap again = std::move(OccupancyMap::create({}, map.octree())).value();
   EXPECT_EQ(leaves_of(map.voxels()), leaves_of(again.voxels()));
