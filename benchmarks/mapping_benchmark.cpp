@@ -1,7 +1,8 @@
-// How long one depth image of 640 x 480 takes to enter the map, beside OctoMap's own insertPointCloud on the
-// same depth: voxels of 10 cm, range 20 m, in a map that has seen the flight before (as at any moment of a
-// flight but its first) and in an empty one.
+// How long one depth image of 640 x 480, whole or in windows, takes to enter the map, beside OctoMap's own
+// insertPointCloud on the same depth: range 20 m, in a map that has seen the flight before and in an empty
+// one.
 #include <cmath>
+#include <map>
 #include <random>
 #include <utility>
 #include <vector>
@@ -26,7 +27,7 @@ struct Flown {
 };
 
 /// Depth with noise of 1 % of Z, which the variance states.
-const Flown& flown() {
+const Flown& flown_at_full_size() {
   static const Flown data = [] {
     Flown made{*simulation::make_analytic_flight("courtyard", kFrames), {}};
     std::mt19937_64 random(1);
@@ -49,10 +50,37 @@ const Flown& flown() {
   return data;
 }
 
+/// Every n-th pixel as the depth of a window of n x n.
+const Flown& flown(int window = 1) {
+  static std::map<int, Flown> all;
+  if (window == 1) return flown_at_full_size();
+  const auto [entry, is_new] = all.try_emplace(window, flown_at_full_size());
+  if (!is_new) return entry->second;
+  for (DepthImage& image : entry->second.images) {
+    image.window = window;
+    for (cv::Mat* part : {&image.depth, &image.variance, &image.state}) {
+      cv::Mat cells(part->rows / window, part->cols / window, part->type());
+      for (int v = 0; v < cells.rows; ++v) {
+        for (int u = 0; u < cells.cols; ++u)
+          (*part)(cv::Rect(u * window + window / 2, v * window + window / 2, 1, 1))
+              .copyTo(cells(cv::Rect(u, v, 1, 1)));
+      }
+      *part = cells;
+    }
+  }
+  return entry->second;
+}
+
+MapOptions options_of(benchmark::State& state) {
+  MapOptions options;
+  options.voxel = 0.01 * static_cast<double>(state.range(2));
+  return options;
+}
+
 void MapIntegrate(benchmark::State& state) {
-  const Flown& data = flown();
+  const Flown& data = flown(static_cast<int>(state.range(1)));
   const bool fresh = state.range(0) != 0;
-  OccupancyMap map = std::move(OccupancyMap::create()).value();
+  OccupancyMap map = std::move(OccupancyMap::create(options_of(state))).value();
   const auto frame = [&](int k) {
     const auto i = static_cast<std::size_t>(k % kFrames);
     benchmark::DoNotOptimize(
@@ -63,18 +91,26 @@ void MapIntegrate(benchmark::State& state) {
   for (auto _ : state) {
     if (fresh) {
       state.PauseTiming();
-      map = std::move(OccupancyMap::create()).value();
+      map = std::move(OccupancyMap::create(options_of(state))).value();
       state.ResumeTiming();
     }
     frame(k++);
   }
+  state.counters["MB"] = static_cast<double>(map.memory()) * 1e-6;
 }
-BENCHMARK(MapIntegrate)->ArgName("empty")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(MapIntegrate)
+    ->ArgNames({"empty", "window", "cm"})
+    ->Args({0, 1, 10})
+    ->Args({1, 1, 10})
+    ->Args({0, 4, 10})
+    ->Args({0, 8, 10})
+    ->Args({0, 1, 5})
+    ->Unit(benchmark::kMillisecond);
 
 void OctoMapInsertPointCloud(benchmark::State& state) {
-  const Flown& data = flown();
+  const Flown& data = flown(static_cast<int>(state.range(1)));
   const bool fresh = state.range(0) != 0;
-  const bool discretize = state.range(1) != 0;
+  const bool discretize = state.range(3) != 0;
   std::vector<octomap::Pointcloud> clouds;
   for (std::size_t i = 0; i < kFrames; ++i) {
     octomap::Pointcloud& cloud = clouds.emplace_back();
@@ -83,7 +119,7 @@ void OctoMapInsertPointCloud(benchmark::State& state) {
       cloud.push_back(p.x, p.y, p.z);
     }
   }
-  octomap::OcTree tree(0.1);
+  octomap::OcTree tree(options_of(state).voxel);
   const auto frame = [&](int k) {
     const auto i = static_cast<std::size_t>(k % kFrames);
     const Eigen::Vector3f eye = data.flight.T_world_camera[i].translation.cast<float>();
@@ -99,12 +135,16 @@ void OctoMapInsertPointCloud(benchmark::State& state) {
     }
     frame(k++);
   }
+  state.counters["MB"] = static_cast<double>(tree.memoryUsage()) * 1e-6;
 }
 BENCHMARK(OctoMapInsertPointCloud)
-    ->ArgNames({"empty", "discretize"})
-    ->Args({0, 0})
-    ->Args({0, 1})
-    ->Args({1, 1})
+    ->ArgNames({"empty", "window", "cm", "discretize"})
+    ->Args({0, 1, 10, 0})
+    ->Args({1, 1, 10, 0})
+    ->Args({0, 4, 10, 0})
+    ->Args({0, 8, 10, 0})
+    ->Args({0, 1, 5, 0})
+    ->Args({0, 1, 10, 1})
     ->Unit(benchmark::kMillisecond);
 
 void BackProject(benchmark::State& state) {

@@ -32,6 +32,7 @@ struct Known {
   simulation::AnalyticFlight flight = *simulation::make_analytic_flight("courtyard", 10);
   OccupancyMap map = map_of(flight, 0.01);
   std::shared_ptr<const MapView> view = MapView::of(map);
+  std::unique_ptr<octomap::OcTree> tree = map.octree();
   Vector3d middle = flight.T_world_camera[5].translation;
   std::vector<Vector3d> points;               // in known space
   std::vector<std::array<Vector3d, 2>> ways;  // of 5 m, most of them clear all along
@@ -73,7 +74,7 @@ void PointQueryByOctree(benchmark::State& state) {
   std::size_t i = 0;
   for (auto _ : state) {
     const Vector3d& p = data.points[i++ & 4095U];
-    benchmark::DoNotOptimize(data.map.tree().search(p.x(), p.y(), p.z()));
+    benchmark::DoNotOptimize(data.tree->search(p.x(), p.y(), p.z()));
   }
 }
 BENCHMARK(PointQueryByOctree);
@@ -112,7 +113,7 @@ void SweptBallByOctree(benchmark::State& state) {
   const Known& data = known();
   std::size_t i = 0;
   for (auto _ : state)
-    benchmark::DoNotOptimize(clear_by_octree(data.map.tree(), data.ways[i++ % data.ways.size()]));
+    benchmark::DoNotOptimize(clear_by_octree(*data.tree, data.ways[i++ % data.ways.size()]));
 }
 BENCHMARK(SweptBallByOctree)->Unit(benchmark::kMicrosecond);
 
@@ -130,7 +131,7 @@ BENCHMARK(Distances)->Unit(benchmark::kMillisecond);
 #ifdef PADE_HAS_DYNAMIC_EDT
 void DistancesByDynamicEdt(benchmark::State& state) {
   const Eigen::AlignedBox3f box = field_box().cast<float>();
-  octomap::OcTree tree(known().map.tree());
+  octomap::OcTree tree(*known().tree);
   for (auto _ : state) {
     DynamicEDTOctomap field(2, &tree, {box.min().x(), box.min().y(), box.min().z()},
                             {box.max().x(), box.max().y(), box.max().z()}, false);

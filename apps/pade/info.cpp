@@ -301,7 +301,7 @@ Status inform_of_map(const InfoArguments& arguments) {
     Json json = {{"kind", "map"},
                  {"file", arguments.path},
                  {"voxel_m", voxel},
-                 {"nodes", map->tree().size()},
+                 {"nodes", map->octree()->size()},
                  {"occupied_voxels", counts.occupied},
                  {"free_voxels", counts.free},
                  {"occupied_m3", volume(counts.occupied)},
@@ -315,7 +315,7 @@ Status inform_of_map(const InfoArguments& arguments) {
     return {};
   }
   fmt::print("{}: occupancy map with voxels of {:g} m\n", arguments.path, voxel);
-  line("nodes", "{}", map->tree().size());
+  line("nodes", "{}", map->octree()->size());
   line("occupied", "{} voxels, {:.3f} m3", counts.occupied, volume(counts.occupied));
   line("free", "{} voxels, {:.3f} m3", counts.free, volume(counts.free));
   if (!bounds.isEmpty()) line("bounds", "{} to {} m", vector_text(bounds.min()), vector_text(bounds.max()));

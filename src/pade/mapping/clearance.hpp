@@ -2,7 +2,9 @@
 // it, part of it or nothing of it is free.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -10,6 +12,7 @@
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
 #include "pade/core/pose.hpp"
+#include "pade/mapping/tiles/look_kernels.hpp"
 
 namespace pade::mapping {
 
@@ -47,6 +50,8 @@ class Clearance {
   /// @param side      metres
   /// @param is_voxel  a voxel is not divided further: the answer is `free` or `nothing`
   [[nodiscard]] View look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const;
+  /// What answers for 64 voxels at once, the same. Valid until set(), and as long as `levels` is.
+  LookView for_voxels(std::vector<EndsLevel>& levels) const;
 
  private:
   struct Extremes {
@@ -56,7 +61,9 @@ class Clearance {
   struct Level {
     int width = 0;
     int height = 0;
-    std::vector<Extremes> cells;
+    int stride = 0;  // rows are longer, so that eight cells can be read from each
+    std::vector<float> nearest;
+    std::array<std::vector<float>, EndsLevel::kScales> farthest;  // from the level above its scale on
   };
   /// Neighbouring cells of a row that end before the same depth.
   struct Run {
@@ -69,12 +76,18 @@ class Clearance {
     bool sees_obstacle;
   };
   void close_holes(const cv::Mat& depth);
-  void find_holes(const cv::Mat& depth, float end);
-  void find_runs(float end, int width, int height);
+  [[nodiscard]] std::vector<std::pair<float, int>> hole_sizes() const;
+  void rank_ends(const std::vector<std::pair<float, int>>& sizes);
+  void find_holes(const cv::Mat& depth);
+  void find_runs(std::uint8_t rank, int width, int height);
+  void note_obstacles(const cv::Mat& depth, float end, int largest);
+  [[nodiscard]] bool may_close(const Hole& hole, int largest) const;
+  void join_above(std::size_t& above, std::size_t begin);
   [[nodiscard]] std::int32_t hole_of(std::int32_t run);
-  void drop_lone_ends(int width, int height);
   void build_pyramid(int width, int height);
-  [[nodiscard]] Extremes over(int u0, int v0, int u1, int v1) const;
+  void halve(std::size_t level);
+  [[nodiscard]] const float* farthest(std::size_t level, std::size_t scale) const;
+  [[nodiscard]] Extremes over(int u0, int v0, int u1, int v1, double z_far) const;
 
   Camera camera_;  // of the cells
   Parameters parameters_;
@@ -84,6 +97,8 @@ class Clearance {
   Eigen::Vector4d side_x_, side_y_, side_z_;  // inward normals of the viewing frustum's sides, camera
   Eigen::Vector4d side_reach_;                // half extents of a cube of side 1 along them
   std::vector<float> ends_, scratch_;         // where the free part of each cell's ray ends; 0 = unknown
+  std::vector<std::uint8_t>
+      ranks_;  // of each cell: the first of the hole sizes at whose depth it is not free
   std::vector<Run> runs_;
   std::vector<Hole> holes_;
   std::vector<Level> levels_;

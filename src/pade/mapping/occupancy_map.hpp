@@ -1,6 +1,6 @@
-// The obstacle map: occupancy in an OctoMap octree (Hornung et al., "OctoMap", Autonomous Robots 2013), fed
-// with depth images whose uncertainty is known per pixel. How a depth image enters the map is derived in
-// docs/mapping.md.
+// The obstacle map: occupancy in log-odds (Hornung et al., "OctoMap", Autonomous Robots 2013) in tiles of
+// voxels, fed with depth images whose uncertainty is known per pixel. How a depth image enters the map is
+// derived in docs/mapping.md.
 #pragma once
 
 #include <array>
@@ -19,10 +19,9 @@
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
 
-// OctoMap's headers cost more than all of this one: whoever uses tree() includes <octomap/OcTree.h>.
+// OctoMap's headers cost more than all of this one: whoever uses octree() includes <octomap/OcTree.h>.
 namespace octomap {
 class OcTree;
-class OcTreeNode;
 }  // namespace octomap
 
 namespace pade::mapping {
@@ -98,9 +97,22 @@ struct MapChange {
   std::vector<MapCell> touched;
   std::size_t hits = 0;          ///< voxels that got a hit
   std::size_t pending_hits = 0;  ///< voxels, of this image and earlier ones, that wait for another look
-  std::size_t pending_free = 0;  ///< voxels that this image shows free, and no earlier one from another place
+  /// Voxels that this image shows free, and no earlier one from another place; without those that the map
+  /// holds for as free as can be.
+  std::size_t pending_free = 0;
   std::size_t too_uncertain = 0;  ///< pixels whose sigma is above hit_max_relative_sigma
   std::size_t outside = 0;  ///< points beyond what the octree can address (32768 voxels from the origin)
+};
+
+class VoxelStore;
+struct HitVoxel;
+
+/// What is known of a voxel, or of a cube of 2^k voxels to a side that all have the same log-odds.
+struct MapLeaf {
+  std::uint64_t code = 0;    ///< bits of the key of its lower corner interleaved, x lowest
+  unsigned depth = 16;       ///< in the octree; 16 = one voxel
+  float log_odds = 0;        ///< of its occupancy
+  bool is_occupied = false;  ///< at or above the threshold
 };
 
 /// Occupied, free and unknown space.
@@ -108,7 +120,8 @@ class OccupancyMap {
  public:
   /// Refuses options that make no sense; the message names the option.
   static Result<OccupancyMap> create(const MapOptions& options = {});
-  /// A map around an existing tree, for example one that was read from a file. The voxel size is the tree's.
+  /// A map with the content of a tree, for example one that was read from a file. The voxel size is the
+  /// tree's.
   static Result<OccupancyMap> create(const MapOptions& options, std::unique_ptr<octomap::OcTree> tree);
 
   /// @{
@@ -144,8 +157,10 @@ class OccupancyMap {
   /// Probability that it is occupied; NaN if unknown.
   [[nodiscard]] double probability(const Eigen::Vector3d& point) const;
 
-  /// Calls `visitor` for every known cell, in the order of the octree.
+  /// Calls `visitor` for every known cell, as large as can be, in the order of OctoMap's octree.
   void for_each(const std::function<void(const MapCell&, Occupancy)>& visitor) const;
+  /// The same with log-odds: what a file is made of.
+  void for_each_leaf(const std::function<void(const MapLeaf&)>& visitor) const;
   /// Occupied cells, in the order of the octree.
   [[nodiscard]] std::vector<MapCell> occupied() const;
   /// Bounds of all known cells; empty if nothing is known.
@@ -158,19 +173,18 @@ class OccupancyMap {
   /// Counts the whole map: time proportional to its size.
   [[nodiscard]] Counts counts() const;
 
-  /// For what OctoMap, dynamicEDT3D and FCL do with a tree.
-  [[nodiscard]] const octomap::OcTree& tree() const;
+  /// A tree of OctoMap's with the same content, made anew: for what OctoMap, dynamicEDT3D and FCL do with
+  /// one.
+  [[nodiscard]] std::unique_ptr<octomap::OcTree> octree() const;
+  /// Bytes of memory that the voxels take.
+  [[nodiscard]] std::size_t memory() const;
+
+  /// For the room's own searches.
+  [[nodiscard]] const VoxelStore& voxels() const { return *voxels_; }
 
  private:
-  class Tree;
   struct Scratch;
   explicit OccupancyMap(const MapOptions& options);
-  [[nodiscard]] const octomap::OcTreeNode* find(const Eigen::Vector3d& point) const;
-  struct HitVoxel;
-  void count_points(const DepthImage& image, const Camera& cells, const Pose& T_world_camera,
-                    MapChange& change);
-  [[nodiscard]] bool is_hit(const HitVoxel& voxel) const;
-  void find_hits(const Camera& cells, const Pose& T_world_camera);
   [[nodiscard]] bool is_on_the_peak(const HitVoxel& voxel, float weight) const;
   [[nodiscard]] float believed(const HitVoxel& voxel);
   void believe_hits(MapChange& change);
@@ -179,7 +193,7 @@ class OccupancyMap {
   void remember_view();
 
   MapOptions options_;
-  std::unique_ptr<Tree> tree_;
+  std::unique_ptr<VoxelStore> voxels_;
   std::unique_ptr<Scratch> scratch_;  // kept between images, so that the frame loop does not allocate
 };
 

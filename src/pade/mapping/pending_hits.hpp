@@ -4,7 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <unordered_map>
+#include <vector>
 
 namespace pade::mapping {
 
@@ -25,14 +25,26 @@ class PendingHits {
   const Evidence& add(std::uint64_t code, float weight, float points, int view);
   /// 0 if nothing waits.
   [[nodiscard]] float weight(std::uint64_t code) const;
-  void erase(std::uint64_t code) { voxels_.erase(code); }
+  void erase(std::uint64_t code);
   /// Drops what was seen last before this view.
   void forget_before(int view);
 
-  [[nodiscard]] std::size_t size() const { return voxels_.size(); }
+  [[nodiscard]] std::size_t size() const { return size_; }
 
  private:
-  std::unordered_map<std::uint64_t, Evidence> voxels_;
+  struct Slot {
+    std::uint64_t code = kEmpty;
+    Evidence evidence;
+  };
+  static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+  [[nodiscard]] std::size_t home_of(std::uint64_t code) const;
+  [[nodiscard]] std::size_t slot_of(std::uint64_t code) const;
+  void rehash(std::size_t slots, int oldest_view);
+  [[nodiscard]] bool is_crowded() const { return 2 * size_ >= slots_.size(); }
+
+  std::vector<Slot> slots_;  // open addressing; a power of two of them
+  std::vector<Slot> spare_;  // the slots of before
+  std::size_t size_ = 0;
 };
 
 }  // namespace pade::mapping

@@ -94,7 +94,7 @@ TEST_P(MapFile, ReadsBackToTheSameSpaceAndTheSameBytes) {
   const std::string content = io::bytes_of(encode_map(flown(), format()));
   const auto map = decode_map(content, "map");
   ASSERT_TRUE(map.ok()) << map.error().message;
-  expect_same_space(flown(), map->tree());
+  expect_same_space(flown(), *map->octree());
   EXPECT_EQ(io::bytes_of(encode_map(*map, format())), content);
 }
 

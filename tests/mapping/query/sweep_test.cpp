@@ -194,7 +194,7 @@ TEST(Ray, ThroughTheCornersOfVoxelsEnds) {
 
 /// A map with one more obstacle.
 OccupancyMap with_obstacle(const OccupancyMap& map, const Vector3d& at) {
-  auto tree = std::make_unique<octomap::OcTree>(map.tree());
+  auto tree = map.octree();
   tree->setNodeValue(at.x(), at.y(), at.z(), tree->getClampingThresMaxLog());
   return std::move(OccupancyMap::create({}, std::move(tree))).value();
 }

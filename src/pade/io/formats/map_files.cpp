@@ -1,13 +1,16 @@
 #include "pade/io/formats/map_files.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <locale>
 #include <memory>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -145,64 +148,87 @@ class StructureCheck {
   bool not_finite_ = false;
 };
 
-/// A node of an .ot file and all below it.
-void put_full(const octomap::OcTree& tree, const octomap::OcTreeNode& node, const ByteSink& sink) {
-  const float log_odds = node.getLogOdds();
-  std::array<char, sizeof log_odds + 1> bytes{};
-  std::memcpy(bytes.data(), &log_odds, sizeof log_odds);
-  unsigned children = 0;
-  for (unsigned i = 0; i < 8; ++i) children |= tree.nodeChildExists(&node, i) ? 1U << i : 0U;
-  bytes.back() = static_cast<char>(children);
-  sink({bytes.data(), bytes.size()});
-  for (unsigned i = 0; i < 8; ++i) {
-    if ((children >> i & 1U) != 0) put_full(tree, *tree.getNodeChild(&node, i), sink);
-  }
-}
-
-/// The inner nodes of a .bt file: each leaf free or occupied, eight equal leaves one.
-class BinaryNodes {
+/// The nodes of a file, of leaves that come in the order of the octree. In a .bt file each leaf is free or
+/// occupied, and eight equal leaves are one.
+class NodeBytes {
  public:
-  explicit BinaryNodes(const octomap::OcTree& tree) : tree_(tree) {}
+  explicit NodeBytes(MapFormat format) : is_binary_(format == MapFormat::bt) {}
 
-  void add_root(const octomap::OcTreeNode& root) {
-    nodes_ = 1;
-    put_children(root);
+  void add(const mapping::MapLeaf& leaf) {
+    if (open_.empty()) open(0);
+    while (leaf.code >> bits_below(depth()) != open_.back().code) close();
+    while (depth() + 1 < leaf.depth) open(leaf.code >> bits_below(depth() + 1));
+    if (leaf.depth == 0) return add_all(leaf);
+    ++nodes_;
+    note(leaf.code >> bits_below(leaf.depth), leaf.is_occupied ? kOccupied : kFree, leaf.log_odds);
+    if (!is_binary_) put(leaf.log_odds);
+  }
+  void finish() {
+    while (!open_.empty()) close();
   }
   [[nodiscard]] std::size_t nodes() const { return nodes_; }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
 
  private:
-  static constexpr unsigned kInner = 3;
+  static constexpr unsigned kFree = 1, kOccupied = 2, kInner = 3;
+  /// An inner node whose children are still coming.
+  struct Open {
+    std::uint64_t code;  // as many bits as its depth has levels
+    std::size_t start;   // of its bytes
+    std::size_t nodes;   // with itself
+    unsigned children;   // two bits each
+    float highest;       // log-odds
+  };
+  static unsigned bits_below(unsigned depth) { return 3 * (mapping::kTreeDepth - depth); }
+  [[nodiscard]] unsigned depth() const { return static_cast<unsigned>(open_.size()) - 1; }
 
-  /// What its parent says of a node: 1 free, 2 occupied, 3 inner.
-  unsigned kind_of(const octomap::OcTreeNode& node) {
-    ++nodes_;
-    if (!tree_.nodeHasChildren(&node)) return tree_.isNodeOccupied(node) ? 2 : 1;
-    const std::size_t start = bytes_.size();
-    const std::size_t nodes = nodes_;
-    const unsigned children = put_children(node);
-    constexpr unsigned kAllFree = 0x5555, kAllOccupied = 0xAAAA;
-    if (children != kAllFree && children != kAllOccupied) return kInner;
-    bytes_.resize(start);
-    nodes_ = nodes;
-    return children == kAllFree ? 1 : 2;
+  void put(float log_odds) {
+    std::array<char, sizeof log_odds + 1> bytes{};
+    std::memcpy(bytes.data(), &log_odds, sizeof log_odds);
+    bytes_.append(bytes.data(), bytes.size());
   }
-
-  unsigned put_children(const octomap::OcTreeNode& node) {
-    const std::size_t start = bytes_.size();
-    bytes_.append(2, '\0');
-    unsigned children = 0;
-    if (tree_.nodeHasChildren(&node)) {
-      for (unsigned i = 0; i < 8; ++i) {
-        if (tree_.nodeChildExists(&node, i)) children |= kind_of(*tree_.getNodeChild(&node, i)) << (2 * i);
-      }
+  /// The whole of space is one leaf.
+  void add_all(const mapping::MapLeaf& leaf) {
+    bytes_.clear();
+    if (is_binary_) {
+      bytes_.assign(2, '\0');
+    } else {
+      put(leaf.log_odds);
     }
-    bytes_[start] = static_cast<char>(children & 255U);
-    bytes_[start + 1] = static_cast<char>(children >> 8U);
-    return children;
+    open_.clear();
+  }
+  void open(std::uint64_t code) {
+    ++nodes_;
+    open_.push_back({code, bytes_.size(), nodes_, 0, -std::numeric_limits<float>::infinity()});
+    bytes_.append(is_binary_ ? 2 : 5, '\0');
+  }
+  void note(std::uint64_t code, unsigned kind, float log_odds) {
+    open_.back().children |= kind << (2 * (code & 7U));
+    open_.back().highest = std::max(open_.back().highest, log_odds);
+  }
+  void close() {
+    constexpr unsigned kAllFree = 0x5555, kAllOccupied = 0xAAAA;
+    const Open node = open_.back();
+    open_.pop_back();
+    unsigned kind = kInner;
+    if (!is_binary_) {
+      unsigned exists = 0;
+      for (unsigned i = 0; i < 8; ++i) exists |= (node.children >> (2 * i) & 3U) != 0 ? 1U << i : 0U;
+      std::memcpy(&bytes_[node.start], &node.highest, sizeof node.highest);
+      bytes_[node.start + sizeof node.highest] = static_cast<char>(exists);
+    } else if (!open_.empty() && (node.children == kAllFree || node.children == kAllOccupied)) {
+      kind = node.children == kAllFree ? kFree : kOccupied;
+      bytes_.resize(node.start);
+      nodes_ = node.nodes;
+    } else {
+      bytes_[node.start] = static_cast<char>(node.children & 255U);
+      bytes_[node.start + 1] = static_cast<char>(node.children >> 8U);
+    }
+    if (!open_.empty()) note(node.code, kind, node.highest);
   }
 
-  const octomap::OcTree& tree_;
+  bool is_binary_;
+  std::vector<Open> open_;  // from the root down
   std::string bytes_;
   std::size_t nodes_ = 0;
 };
@@ -210,26 +236,17 @@ class BinaryNodes {
 }  // namespace
 
 ByteSource encode_map(const mapping::OccupancyMap& map, MapFormat format) {
-  // Written here, since OctoMap's header is in the locale of the stream and gives res with six digits, and
-  // its binary file needs a second tree.
+  // Written here, without an octree of OctoMap's, whose header is in the locale of the stream and gives res
+  // with six digits.
   return [&map, format](const ByteSink& sink) {
-    const octomap::OcTree& tree = map.tree();
-    const octomap::OcTreeNode* root = tree.getRoot();
-    const auto header = [&](std::string_view magic, std::size_t nodes) {
-      sink(fmt::format(
-          "{}\n# (feel free to add / change comments, but leave the first line as it is!)\n#\nid OcTree\n"
-          "size {}\nres {}\ndata\n",
-          magic, nodes, tree.getResolution()));
-    };
-    if (format == MapFormat::bt) {
-      BinaryNodes binary(tree);
-      if (root != nullptr) binary.add_root(*root);
-      header(kMagicBinary, binary.nodes());
-      sink(binary.bytes());
-    } else {
-      header(kMagicFull, tree.size());
-      if (root != nullptr) put_full(tree, *root, sink);
-    }
+    NodeBytes nodes(format);
+    map.for_each_leaf([&nodes](const mapping::MapLeaf& leaf) { nodes.add(leaf); });
+    nodes.finish();
+    sink(fmt::format(
+        "{}\n# (feel free to add / change comments, but leave the first line as it is!)\n#\nid OcTree\n"
+        "size {}\nres {}\ndata\n",
+        format == MapFormat::bt ? kMagicBinary : kMagicFull, nodes.nodes(), map.options().voxel));
+    sink(nodes.bytes());
   };
 }
 

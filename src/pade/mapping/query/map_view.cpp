@@ -8,9 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include <octomap/OcTree.h>
-
-#include "pade/mapping/map_update.hpp"
 #include "pade/mapping/query/tile_builder.hpp"
 #include "pade/mapping/query/voxel_grid.hpp"
 
@@ -69,8 +66,8 @@ std::shared_ptr<const MapView> MapView::of(const OccupancyMap& map) { return of(
 
 std::shared_ptr<const MapView> MapView::of(const OccupancyMap& map, const AlignedBox3d& window) {
   const std::array<TouchedCube, 1> all{};
-  TileTree tiles =
-      rebuilt(empty_tiles(map.tree()), map.tree(), all, window_in_tiles(window, map.options().voxel));
+  TileTree tiles = rebuilt(empty_tiles(map.voxels(), map.options().voxel), map.voxels(), all,
+                           window_in_tiles(window, map.options().voxel));
   return std::shared_ptr<const MapView>(new MapView(std::move(tiles), window));
 }
 
@@ -78,9 +75,9 @@ std::shared_ptr<const MapView> MapView::after(const OccupancyMap& map, const Map
   std::vector<TouchedCube> touched;
   touched.reserve(change.touched.size());
   for (const MapCell& cell : change.touched) {
-    touched.push_back({morton_code({cell.key[0], cell.key[1], cell.key[2]}), cell.depth});
+    touched.push_back({morton_code(cell.key), cell.depth});
   }
-  TileTree tiles = rebuilt(*tiles_, map.tree(), touched, window_in_tiles(window_, tiles_->voxel));
+  TileTree tiles = rebuilt(*tiles_, map.voxels(), touched, window_in_tiles(window_, tiles_->voxel));
   return std::shared_ptr<const MapView>(new MapView(std::move(tiles), window_));
 }
 
@@ -94,7 +91,8 @@ std::shared_ptr<const MapView> MapView::flown(std::span<const Vector3d> path, do
       std::uint64_t fresh = inside[z] & ~old.words[z].known;
       tile->words[z].known |= fresh;
       for (; fresh != 0; fresh &= fresh - 1)
-        tile->log_odds[64 * z + static_cast<std::size_t>(std::countr_zero(fresh))] = -127;
+        tile->log_odds[index_in_tile(std::countr_zero(fresh) & 7, std::countr_zero(fresh) >> 3,
+                                     static_cast<int>(z))] = -127;
     }
     tile->summarise();
     changed.emplace_back(place, std::move(tile));

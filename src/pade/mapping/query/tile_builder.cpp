@@ -6,9 +6,7 @@
 #include <optional>
 #include <type_traits>
 
-#include <octomap/OcTree.h>
-
-#include "pade/mapping/map_update.hpp"
+#include "pade/mapping/tiles/voxel_store.hpp"
 
 namespace pade::mapping {
 
@@ -50,8 +48,54 @@ void TileTree::index() {
 
 namespace {
 
-int quantised(double log_odds, double step) {
-  return static_cast<int>(std::lround(std::clamp(log_odds / step, -127.0, 127.0)));
+std::int8_t quantised(float log_odds, float per_step) {
+  const float steps = std::clamp(log_odds * per_step, -127.0F, 127.0F);
+  return static_cast<std::int8_t>(
+      static_cast<int>(steps + (steps < 0 ? -0.5F : 0.5F)));  // NOLINT(bugprone-incorrect-roundings)
+}
+
+/// Swaps two bits of the index of each bit of a word.
+template <unsigned high, unsigned low>
+std::uint64_t with_index_bits_swapped(std::uint64_t word) {
+  constexpr unsigned kShift = (1U << high) - (1U << low);
+  constexpr std::uint64_t kMoved = [] {
+    std::uint64_t mask = 0;
+    for (unsigned i = 0; i < 64; ++i)
+      if ((i >> low & 1U) != 0 && (i >> high & 1U) == 0) mask |= std::uint64_t{1} << i;
+    return mask;
+  }();
+  const std::uint64_t moved = (word ^ word >> kShift) & kMoved;
+  return word ^ moved ^ moved << kShift;
+}
+
+/// 4 x 4 x 4 bits from Morton order to rows along x.
+std::uint64_t in_rows(std::uint64_t word) {
+  word = with_index_bits_swapped<4, 2>(word);
+  word = with_index_bits_swapped<3, 2>(word);
+  return with_index_bits_swapped<2, 1>(word);
+}
+
+/// Adds 4 x 4 x 4 bits in rows, an eighth of a tile, to the words of the tile.
+void add_eighth(std::uint64_t rows, std::size_t eighth, std::uint64_t Tile::Word::*kind, Tile& tile) {
+  const unsigned shift = ((eighth & 2U) != 0 ? 32U : 0U) + ((eighth & 1U) != 0 ? 4U : 0U);
+  for (std::size_t z = 0; z < 4; ++z) {
+    std::uint64_t slab = rows >> (16 * z) & 0xffffU;
+    slab = (slab | slab << 8U) & 0x00ff00ffU;
+    slab = (slab | slab << 4U) & 0x0f0f0f0fU;
+    tile.words[((eighth & 4U) != 0 ? 4 : 0) + z].*kind |= slab << shift;
+  }
+}
+
+std::shared_ptr<const Tile> make_tile(const VoxelTile& from, float per_step) {
+  auto tile = std::make_shared<Tile>();
+  for (std::size_t eighth = 0; eighth < 8; ++eighth) {
+    add_eighth(in_rows(from.known[eighth]), eighth, &Tile::Word::known, *tile);
+    add_eighth(in_rows(from.occupied[eighth]), eighth, &Tile::Word::occupied, *tile);
+  }
+  for (std::size_t i = 0; i < from.log_odds.size(); ++i)
+    tile->log_odds[i] = quantised(from.log_odds[i], per_step);
+  tile->summarise();
+  return tile;
 }
 
 std::shared_ptr<const Tile> make_uniform(int value) {
@@ -98,36 +142,38 @@ constexpr unsigned depth_of() {
   }
 }
 
-unsigned bits_below(unsigned depth) { return 3 * (kTreeDepth - depth); }
-
-/// Walks octree and tiles together.
+/// Walks the voxels of the map and the tiles together.
 class Builder {
  public:
-  Builder(TileTree& tiles, const octomap::OcTree& octree, const TileBounds& window)
-      : tiles_(tiles), octree_(octree), window_(window) {}
+  Builder(TileTree& tiles, const VoxelStore& voxels, const TileBounds& window)
+      : tiles_(tiles), voxels_(voxels), window_(window), per_step_(static_cast<float>(1 / tiles.step)) {}
 
   template <class Part>
-  std::shared_ptr<const Part> build(const octomap::OcTreeNode* node, std::uint64_t code,
-                                    const std::shared_ptr<const Part>& old,
+  std::shared_ptr<const Part> build(std::uint64_t code, const std::shared_ptr<const Part>& old,
                                     std::span<const TouchedCube> touched) {
-    const TileBounds place = place_of(code, depth_of<Part>());
-    if (!touches(place)) return uniform_part<Part>(*tiles_.uniform, UniformTiles::kUnknown);
-    if (node == nullptr) return uniform_part<Part>(*tiles_.uniform, UniformTiles::kUnknown);
-    if (!octree_.nodeHasChildren(node) && is_inside(place)) {
-      extend(place);
-      return uniform_part<Part>(*tiles_.uniform, value_of(*node));
-    }
-    if constexpr (std::is_same_v<Part, Tile>) {
-      extend(place);
-      return tile_of(*node);
+    if constexpr (std::is_same_v<Part, TileWorld>) {
+      return node_of<Part>(code, old, touched);
     } else {
-      return node_of<Part>(node, code, old, touched);
+      const TileBounds place = place_of(code, depth_of<Part>());
+      const VoxelStore::Entry& entry = voxels_.find(code, depth_of<Part>());
+      if (!touches(place) || entry.part == VoxelStore::Entry::kUnknown)
+        return uniform_part<Part>(*tiles_.uniform, UniformTiles::kUnknown);
+      if (!entry.has_parts() && is_inside(place)) {
+        extend(place);
+        return uniform_part<Part>(*tiles_.uniform, value_of(entry.value));
+      }
+      if constexpr (std::is_same_v<Part, Tile>) {
+        extend(place);
+        return make_tile(voxels_.tile(entry), per_step_);
+      } else {
+        return node_of<Part>(code, old, touched);
+      }
     }
   }
 
  private:
   static TileBounds place_of(std::uint64_t code, unsigned depth) {
-    const octomap::OcTreeKey key = morton_key(code);
+    const VoxelKey key = morton_key(code);
     const int side = kVoxelsPerAxis >> depth;
     TileBounds place;
     for (unsigned axis = 0; axis < 3; ++axis) {
@@ -156,14 +202,13 @@ class Builder {
       tiles_.bounds.last[axis] = std::max(tiles_.bounds.last[axis], place.last[axis]);
     }
   }
-  [[nodiscard]] int value_of(const octomap::OcTreeNode& node) const {
-    const int steps = quantised(node.getLogOdds(), tiles_.step) + 128;
-    return octree_.isNodeOccupied(node) ? steps + 256 : steps;
+  [[nodiscard]] int value_of(float log_odds) const {
+    const int steps = quantised(log_odds, per_step_) + 128;
+    return voxels_.is_occupied(log_odds) ? steps + 256 : steps;
   }
 
   template <class Part>
-  std::shared_ptr<const Part> node_of(const octomap::OcTreeNode* node, std::uint64_t code,
-                                      const std::shared_ptr<const Part>& old,
+  std::shared_ptr<const Part> node_of(std::uint64_t code, const std::shared_ptr<const Part>& old,
                                       std::span<const TouchedCube> touched) {
     using Child = typename Part::Child;
     constexpr unsigned kDepth = depth_of<Part>();
@@ -184,8 +229,7 @@ class Builder {
       for (std::uint64_t child = from; child <= to; ++child) {
         const std::uint64_t child_code = child << below;
         auto& slot = made->children[slot_of<Part>(child_code)];
-        slot = build<Child>(descend(node, kDepth, kChildDepth, child_code), child_code, slot,
-                            touched.first(count));
+        slot = build<Child>(child_code, slot, touched.first(count));
       }
       touched = touched.subspan(count);
     }
@@ -194,57 +238,17 @@ class Builder {
 
   template <class Part>
   static std::size_t slot_of(std::uint64_t code) {
-    const octomap::OcTreeKey key = morton_key(code);
+    const VoxelKey key = morton_key(code);
     const unsigned shift = kTreeDepth - depth_of<typename Part::Child>();
     const unsigned mask = (1U << Part::kBits) - 1;
     return (key[0] >> shift & mask) | (key[1] >> shift & mask) << Part::kBits |
            (key[2] >> shift & mask) << (2 * Part::kBits);
   }
 
-  /// The node at a depth, or the leaf above it, or null where nothing is known.
-  [[nodiscard]] const octomap::OcTreeNode* descend(const octomap::OcTreeNode* node, unsigned depth,
-                                                   unsigned to, std::uint64_t code) const {
-    for (unsigned d = depth + 1; d <= to && node != nullptr && octree_.nodeHasChildren(node); ++d) {
-      const auto child = static_cast<unsigned>(code >> bits_below(d) & 7U);
-      node = octree_.nodeChildExists(node, child) ? octree_.getNodeChild(node, child) : nullptr;
-    }
-    return node;
-  }
-
-  [[nodiscard]] std::shared_ptr<const Tile> tile_of(const octomap::OcTreeNode& node) const {
-    auto tile = std::make_shared<Tile>();
-    fill(*tile, node, {0, 0, 0}, kTileSide);
-    tile->summarise();
-    return tile;
-  }
-  void fill(Tile& tile, const octomap::OcTreeNode& node, VoxelIndex corner, int side) const {
-    if (octree_.nodeHasChildren(&node)) {
-      const int half = side / 2;
-      for (unsigned i = 0; i < 8; ++i) {
-        if (!octree_.nodeChildExists(&node, i)) continue;
-        const VoxelIndex at{corner[0] + ((i & 1U) != 0 ? half : 0), corner[1] + ((i & 2U) != 0 ? half : 0),
-                            corner[2] + ((i & 4U) != 0 ? half : 0)};
-        fill(tile, *octree_.getNodeChild(&node, i), at, half);
-      }
-      return;
-    }
-    const bool is_occupied = octree_.isNodeOccupied(node);
-    const auto steps = static_cast<std::int8_t>(quantised(node.getLogOdds(), tiles_.step));
-    const auto row = ((std::uint64_t{1} << side) - 1) << corner[0];
-    for (int z = corner[2]; z < corner[2] + side; ++z) {
-      for (int y = corner[1]; y < corner[1] + side; ++y) {
-        Tile::Word& word = tile.words[static_cast<std::size_t>(z)];
-        word.known |= row << (8 * y);
-        if (is_occupied) word.occupied |= row << (8 * y);
-        const auto first = tile.log_odds.begin() + 64 * z + 8 * y + corner[0];
-        std::fill(first, first + side, steps);
-      }
-    }
-  }
-
   TileTree& tiles_;
-  const octomap::OcTree& octree_;
+  const VoxelStore& voxels_;
   TileBounds window_;
+  float per_step_;
 };
 
 using Changed = std::pair<VoxelIndex, std::shared_ptr<const Tile>>;
@@ -282,24 +286,23 @@ std::shared_ptr<const Part> replaced(const std::shared_ptr<const Part>& old, std
 
 }  // namespace
 
-TileTree empty_tiles(const octomap::OcTree& octree) {
+TileTree empty_tiles(const VoxelStore& voxels, double voxel) {
   TileTree tiles;
-  tiles.voxel = octree.getResolution();
+  tiles.voxel = voxel;
   tiles.per_voxel = 1 / tiles.voxel;
-  const double most =
-      std::max(std::abs(octree.getClampingThresMinLog()), std::abs(octree.getClampingThresMaxLog()));
+  const double most = std::max(std::abs(voxels.rules().least), std::abs(voxels.rules().most));
   tiles.step = std::max(most, 1e-3) / 127;
   tiles.uniform = std::make_shared<UniformTiles>();
   tiles.world = uniform_part<TileWorld>(*tiles.uniform, UniformTiles::kUnknown);
   return tiles;
 }
 
-TileTree rebuilt(TileTree tiles, const octomap::OcTree& octree, std::span<const TouchedCube> touched,
+TileTree rebuilt(TileTree tiles, const VoxelStore& voxels, std::span<const TouchedCube> touched,
                  const TileBounds& window) {
   if (touched.empty()) return tiles;
   const std::lock_guard lock(tiles.uniform->mutex);
-  Builder builder(tiles, octree, window);
-  tiles.world = builder.build<TileWorld>(octree.getRoot(), 0, tiles.world, touched);
+  Builder builder(tiles, voxels, window);
+  tiles.world = builder.build<TileWorld>(0, tiles.world, touched);
   tiles.index();
   return tiles;
 }

@@ -1,5 +1,5 @@
-// Makes trees of tiles from an octree, whole or where it has changed, and trees with other tiles in some
-// places.
+// Makes trees of tiles from the voxels of a map, whole or where it has changed, and trees with other tiles in
+// some places.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,9 @@
 
 #include "pade/mapping/query/tile_tree.hpp"
 
-namespace octomap {
-class OcTree;
-}  // namespace octomap
-
 namespace pade::mapping {
+
+class VoxelStore;
 
 /// A cube of the octree by the Morton code of its lower corner.
 struct TouchedCube {
@@ -25,12 +23,12 @@ struct TouchedCube {
 };
 
 /// Nothing is known.
-TileTree empty_tiles(const octomap::OcTree& octree);
+TileTree empty_tiles(const VoxelStore& voxels, double voxel);
 
-/// The tree with the cubes taken from the octree anew.
+/// The tree with the cubes taken from the map anew.
 /// @param touched  in Morton order, disjoint
 /// @param window   in tiles; outside all is unknown
-TileTree rebuilt(TileTree tiles, const octomap::OcTree& octree, std::span<const TouchedCube> touched,
+TileTree rebuilt(TileTree tiles, const VoxelStore& voxels, std::span<const TouchedCube> touched,
                  const TileBounds& window);
 
 /// The tree with other tiles in some places (tile coordinates, each once).

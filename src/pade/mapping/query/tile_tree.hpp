@@ -26,7 +26,8 @@ struct Tile {
     std::uint64_t occupied = 0;
   };
   std::array<Word, 8> words{};
-  std::array<std::int8_t, 512> log_odds{};  ///< in steps of TileTree::step(), of known voxels
+  std::array<std::int8_t, 512>
+      log_odds{};  ///< in steps of TileTree::step(), of known voxels, in Morton order
   bool any_occupied = false;
   bool any_unknown = true;
 

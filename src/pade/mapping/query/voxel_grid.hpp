@@ -11,8 +11,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "pade/mapping/map_update.hpp"
 #include "pade/mapping/query/tile_tree.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
 namespace pade::mapping {
 
@@ -43,9 +43,7 @@ inline VoxelIndex voxel_beside(const Eigen::Vector3d& point, double voxel) {
   return v;
 }
 
-inline std::size_t index_in_tile(const VoxelIndex& v) {
-  return static_cast<std::size_t>((v[2] & 7) << 6 | (v[1] & 7) << 3 | (v[0] & 7));
-}
+inline std::size_t index_in_tile(const VoxelIndex& v) { return index_in_tile(v[0], v[1], v[2]); }
 
 inline Eigen::Vector3d corner_of(const VoxelIndex& v, double voxel) {
   return voxel * Eigen::Vector3d(v[0] - kTreeCentre, v[1] - kTreeCentre, v[2] - kTreeCentre);

@@ -9,13 +9,12 @@
 #include <Eigen/Core>
 #include <octomap/OcTree.h>
 
-#include "pade/mapping/clearance.hpp"
-#include "pade/mapping/occupancy_map.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
-namespace pade::mapping {
+#include "mapping/tree/clearance.hpp"
+#include "mapping/tree/tree_map.hpp"
 
-inline constexpr unsigned kTileDepth = kTreeDepth - 3;  // in the octree, of a cube of 8 voxels to a side
-inline constexpr int kTreeCentre = 32768;               // key of the voxel just above the origin
+namespace pade::mapping::tree {
 
 /// Keys interleaved bit by bit, x lowest: sorting by it walks the octree depth first.
 std::uint64_t morton_code(const octomap::OcTreeKey& key);
@@ -79,7 +78,4 @@ class UpdatableTree : public octomap::OcTree {
   void settle(octomap::OcTreeNode* node);
 };
 
-/// The cell of a cube with this Morton code.
-MapCell cell_of(std::uint64_t code, unsigned depth, double voxel);
-
-}  // namespace pade::mapping
+}  // namespace pade::mapping::tree

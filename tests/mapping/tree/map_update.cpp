@@ -1,10 +1,10 @@
-#include "pade/mapping/map_update.hpp"
+#include "mapping/tree/map_update.hpp"
 
 #include <algorithm>
 #include <array>
 #include <utility>
 
-namespace pade::mapping {
+namespace pade::mapping::tree {
 namespace {
 
 /// Spreads 16 bits to every third bit.
@@ -24,10 +24,6 @@ std::uint16_t gather(std::uint64_t x) {
   x = (x | x >> 16U) & 0x00000000ffffU;
   return static_cast<std::uint16_t>(x);
 }
-
-unsigned bits_below(unsigned depth) { return 3 * (kTreeDepth - depth); }
-
-std::size_t voxels_of(unsigned depth) { return std::size_t{1} << bits_below(depth); }
 
 /// Walks the octree from the top, all in the camera's frame.
 class FreeSpaceSearch {
@@ -132,20 +128,6 @@ std::uint64_t morton_code(const octomap::OcTreeKey& key) {
 
 octomap::OcTreeKey morton_key(std::uint64_t code) {
   return {gather(code), gather(code >> 1U), gather(code >> 2U)};
-}
-
-MapCell cell_of(std::uint64_t code, unsigned depth, double voxel) {
-  MapCell cell;
-  const octomap::OcTreeKey key = morton_key(code);
-  cell.key = {key[0], key[1], key[2]};
-  cell.depth = depth;
-  const double voxels = static_cast<double>(1U << (kTreeDepth - depth));
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    cell.centre[static_cast<int>(axis)] =
-        static_cast<float>((static_cast<double>(cell.key[axis]) - kTreeCentre + 0.5 * voxels) * voxel);
-  }
-  cell.side = static_cast<float>(voxels * voxel);
-  return cell;
 }
 
 void HitCounter::add(const octomap::OcTreeKey& key, std::uint32_t certainty) {
@@ -289,4 +271,4 @@ void UpdatableTree::settle(octomap::OcTreeNode* node) {
   if (!pruneNode(node)) node->updateOccupancyChildren();
 }
 
-}  // namespace pade::mapping
+}  // namespace pade::mapping::tree

@@ -1,0 +1,194 @@
+// What the map knows of each voxel: log-odds in tiles of 8 x 8 x 8 under nodes of 512 parts. Whatever is the
+// same all over, free or unknown, is one entry of the node above it, however large it is.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "pade/mapping/occupancy_map.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
+
+namespace pade::mapping {
+
+/// The probabilities of MapOptions in log-odds, rounded to float as OctoMap does.
+struct LogOdds {
+  explicit LogOdds(const MapOptions& options);
+  float hit, miss;
+  float least, most;
+  float occupied;  ///< at and above
+};
+
+/// An update of one voxel.
+struct VoxelHit {
+  std::uint64_t code = 0;
+  float change = 0;  ///< of the log-odds
+};
+
+/// Voxels of one tile or of a larger cube that an image shows free.
+struct FreeCube {
+  std::uint64_t code = 0;  ///< Morton code of its lower corner
+  unsigned depth = kTileDepth;
+  /// Of a tile: by eighths, bit = low six bits of the Morton code. A larger cube is free as a whole.
+  std::array<std::uint64_t, 8> voxels{};
+};
+
+/// 8 x 8 x 8 voxels in Morton order: words by eighths, bit = low six bits of the code.
+struct VoxelTile {
+  std::array<std::uint64_t, 8> known{};
+  std::array<std::uint64_t, 8> occupied{};
+  std::array<std::uint64_t, 8> least{};  ///< known and as free as can be: a miss changes nothing
+  std::array<float, 512> log_odds{};     ///< of known voxels, else 0
+
+  [[nodiscard]] bool any_unknown() const {
+    std::uint64_t all = ~std::uint64_t{0};
+    for (const std::uint64_t word : known) all &= word;
+    return ~all != 0;
+  }
+};
+
+/// All voxels of a map.
+class VoxelStore {
+ public:
+  /// What is below a node: nothing, one state all over, or parts.
+  struct Entry {
+    static constexpr std::uint32_t kUnknown = 0xffffffff;
+    static constexpr std::uint32_t kUniform = 0xfffffffe;
+    std::uint32_t part = kUnknown;  ///< or the number of the node or tile
+    float value = 0;                ///< log-odds, if uniform
+    [[nodiscard]] bool has_parts() const { return part < kUniform; }
+    bool operator==(const Entry& other) const = default;
+  };
+  using Node = std::array<Entry, 512>;  ///< in Morton order
+
+  VoxelStore(const LogOdds& rules, double voxel);
+
+  [[nodiscard]] const LogOdds& rules() const { return rules_; }
+  [[nodiscard]] bool empty() const { return empty_; }
+
+  /// The entry of the smallest cube that is at this depth or above: 4, 7, 10 or 13 = a tile.
+  [[nodiscard]] const Entry& find(std::uint64_t code, unsigned depth) const;
+  [[nodiscard]] const VoxelTile& tile(const Entry& entry) const {
+    return tiles_[entry.part >> 8U][entry.part & 255U];
+  }
+  /// Log-odds of a voxel; false if it is unknown.
+  bool value_at(std::uint64_t code, float& log_odds) const;
+  [[nodiscard]] bool is_occupied(float log_odds) const { return log_odds >= rules_.occupied; }
+  /// Whether a miss changes nothing in the cube as a whole.
+  [[nodiscard]] bool is_least(const Entry& entry) const {
+    return entry.part == Entry::kUniform && entry.value <= rules_.least;
+  }
+  /// Voxels of a cube in which a miss changes nothing.
+  [[nodiscard]] std::uint64_t count_least(std::uint64_t code, unsigned depth) const;
+
+  /// Hits, and misses where an image shows free, in one pass. What changed is appended to `change`.
+  /// @param free  in Morton order, disjoint, without the voxels of `hits`
+  /// @param hits  in Morton order
+  void apply(std::span<const FreeCube> free, std::span<const VoxelHit> hits, MapChange& change);
+  /// Sets all of a cube.
+  void set(std::uint64_t code, unsigned depth, float log_odds);
+
+  /// Calls visitor(code, depth, log_odds) for every known cube of one value, as large as they can be, in the
+  /// order of the octree.
+  template <class Visitor>
+  void for_each(const Visitor& visitor) const {
+    leaves_of(root_, 0, 0, visitor);
+  }
+  /// Of memory, in bytes.
+  [[nodiscard]] std::size_t memory() const;
+
+ private:
+  static constexpr unsigned kRootDepth = 4;  // of the root's entries
+
+  template <class Visitor>
+  void leaves_of(std::span<const Entry> entries, std::uint64_t code, unsigned depth,
+                 const Visitor& visitor) const;
+  template <class Visitor>
+  void leaves_of(const VoxelTile& tile, std::uint64_t code, const Visitor& visitor) const;
+
+  std::uint32_t new_tile();
+  std::uint32_t new_node(const Entry& all);
+  void free_parts(Entry& entry, unsigned depth);
+  VoxelTile& tile(const Entry& entry) { return tiles_[entry.part >> 8U][entry.part & 255U]; }
+  VoxelTile& opened_tile(Entry& entry);
+  Node& opened_node(Entry& entry);
+  void join(Entry& entry, unsigned depth, const Entry& part);
+  void fill(VoxelTile& tile, float log_odds) const;
+  [[nodiscard]] float added(float log_odds, float change) const;
+
+  template <class Update>
+  void descend(Entry& entry, unsigned depth, std::uint64_t code, unsigned to, const Update& update);
+  bool miss_all(Entry& entry, std::uint64_t code, unsigned depth, MapChange& change);
+  void update_tile(Entry& entry, const FreeCube& free, std::span<const VoxelHit> hits, MapChange& change);
+  void miss_cube(const FreeCube& cube, MapChange& change);
+  void miss(VoxelTile& tile, std::size_t eighth, std::uint64_t voxels) const;
+  void put(VoxelTile& tile, std::size_t voxel, float log_odds) const;
+
+  LogOdds rules_;
+  double voxel_;
+  bool empty_ = true;
+  std::vector<Entry> root_;  // 4096
+  std::vector<std::unique_ptr<Node>> nodes_;
+  std::vector<std::unique_ptr<VoxelTile[]>> tiles_;  // 256 each NOLINT(*-avoid-c-arrays)
+  std::vector<std::uint32_t> spare_nodes_, spare_tiles_;
+};
+
+template <class Visitor>
+void VoxelStore::leaves_of(std::span<const Entry> entries, std::uint64_t code, unsigned depth,
+                           const Visitor& visitor) const {
+  // Entries of one cube, at most the 4096 of all or the 512 of a node: one leaf if they are the same.
+  const Entry& first = entries.front();
+  bool same = !first.has_parts();
+  for (std::size_t i = 1; same && i < entries.size(); ++i) same = entries[i] == first;
+  if (same) {
+    if (first.part == Entry::kUniform) visitor(code, depth, first.value);
+    return;
+  }
+  if (entries.size() > 1) {
+    const std::size_t eighth = entries.size() / 8;
+    for (std::size_t i = 0; i < 8; ++i) {
+      leaves_of(entries.subspan(i * eighth, eighth), code + i * voxels_of(depth + 1), depth + 1, visitor);
+    }
+    return;
+  }
+  if (depth == kTileDepth) {
+    leaves_of(tile(first), code, visitor);
+  } else {
+    leaves_of(*nodes_[first.part], code, depth, visitor);
+  }
+}
+
+template <class Visitor>
+void VoxelStore::leaves_of(const VoxelTile& tile, std::uint64_t code, const Visitor& visitor) const {
+  const auto same = [&](std::size_t from, std::size_t count) {
+    const float first = tile.log_odds[from];
+    bool yes = true;
+    for (std::size_t i = from + 1; yes && i < from + count; ++i) yes = tile.log_odds[i] == first;
+    return yes;
+  };
+  if (!tile.any_unknown() && same(0, 512)) return visitor(code, kTileDepth, tile.log_odds[0]);
+  for (std::size_t eighth = 0; eighth < 8; ++eighth) {
+    const std::uint64_t known = tile.known[eighth];
+    if (known == 0) continue;
+    const std::size_t base = 64 * eighth;
+    if (~known == 0 && same(base, 64)) {
+      visitor(code + base, kTileDepth + 1, tile.log_odds[base]);
+      continue;
+    }
+    for (std::size_t i = 0; i < 64; i += 8) {
+      const auto eight = static_cast<unsigned>(known >> i & 255U);
+      if (eight == 255 && same(base + i, 8)) {
+        visitor(code + base + i, kTileDepth + 2, tile.log_odds[base + i]);
+        continue;
+      }
+      for (std::size_t k = 0; k < 8; ++k) {
+        if ((eight >> k & 1U) != 0) visitor(code + base + i + k, kTreeDepth, tile.log_odds[base + i + k]);
+      }
+    }
+  }
+}
+
+}  // namespace pade::mapping
