@@ -94,7 +94,7 @@ Status check(const FootingOptions& options) {
 /// Row by row from below, so that a patch hands on what it stands on.
 void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vector3d& up,
                       const FootingOptions& options) {
-  if (image.bound.empty() || -up.y() < kSteepest || std::abs(up.x()) > -up.y()) return;
+  if (!options.on || image.bound.empty() || -up.y() < kSteepest || std::abs(up.x()) > -up.y()) return;
   const Columns columns(image, up);
   const int width = image.bound.cols;
   cv::Mat footing(image.bound.size(), CV_32FC1, cv::Scalar(kNone));

@@ -10,8 +10,9 @@
 
 namespace pade::depth {
 
+/// Options of bound_by_footing().
 struct FootingOptions {
-  bool on = false;
+  bool on = false;        ///< off: nothing is done
   double headroom = 1.5;  ///< m above the camera; what is blank and hangs lower than this is not foreseen
 
   template <class Self, class Visitor>
@@ -35,9 +36,13 @@ Status check(const FootingOptions& options);
 ///
 /// What this cannot see is a blank thing that hangs lower than `headroom` and has no contrast along its lower
 /// edge, or one that leans toward the camera. Indoors, leave it off.
-/// @param up  direction of up, camera axes, of length 1. Nothing is done where the camera looks more than 60
-/// degrees
+/// @param image    its `bound` is raised where the state is no_texture; nothing is done where it has no
+/// bounds
+/// @param camera   undistorted pinhole of the image
+/// @param up       direction of up, camera axes, of length 1. Nothing is done where the camera looks more
+/// than 60 degrees
 ///            up or down, or is banked by more than 45.
+/// @param options  what check() accepts
 void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vector3d& up,
                       const FootingOptions& options);
 
