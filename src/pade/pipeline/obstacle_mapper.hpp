@@ -131,17 +131,17 @@ struct MapperUpdate {
     skipped,  ///< the frame was left out: `reason`
   };
   Outcome outcome = Outcome::waiting;  ///< of this call; all else but `reason` is of the last frame mapped
-  std::string reason;                  ///< why the frame was skipped; else empty
-  Frame reference;                     ///< the frame of the depth image, grey; its pose is the refined one
+  bool aligned = false;                ///< the depth of the frame before has refined the motion further
+  int step = 0;                        ///< frames between the two of `motion`
+  int views = 0;       ///< further frames that the depth was read from, together; 0 = from pairs
+  std::string reason;  ///< why the frame was skipped; else empty
+  Frame reference;     ///< the frame of the depth image, grey; its pose is the refined one
   RelativeMotion
       motion;      ///< the farthest camera that the depth was read from, seen from the reference, refined
-  int step = 0;    ///< frames between the two
-  int views = 0;   ///< further frames that the depth was read from, together; 0 = from pairs
   FlowField flow;  ///< of the last pair, from the reference to the other image (derotated where derotate =
                    ///< image); with further views this is the pair of options.step
   depth::RefinedMotion refinement;      ///< of the motion over `step` of the options, and how it was found
   DepthImage depth;                     ///< of the reference: depth, variance, state, bound per pixel
-  bool aligned = false;                 ///< the depth of the frame before has refined the motion further
   depth::DepthDiagnostics diagnostics;  ///< of the (last) pair
   mapping::MapChange change;            ///< what the depth image changed in the map
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
