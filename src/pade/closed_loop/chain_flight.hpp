@@ -78,7 +78,7 @@ struct ChainFrame {
 struct ChainMoment {
   double done = 0;             ///< share of the way, 0 to 1
   const cv::Mat& image;        ///< as the camera has delivered it; empty if it has not
-  const MapperUpdate* update;  ///< null if the mapper did not take it
+  const MapperUpdate* update = nullptr;  ///< null if the mapper did not take it
   const ChainFrame& frame;
 };
 
