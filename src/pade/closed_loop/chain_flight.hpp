@@ -76,8 +76,8 @@ struct ChainFrame {
 
 /// What there is to see of a flight, after each frame. Its parts are valid until the observer returns.
 struct ChainMoment {
-  double done = 0;             ///< share of the way, 0 to 1
-  const cv::Mat& image;        ///< as the camera has delivered it; empty if it has not
+  double done = 0;                       ///< share of the way, 0 to 1
+  const cv::Mat& image;                  ///< as the camera has delivered it; empty if it has not
   const MapperUpdate* update = nullptr;  ///< null if the mapper did not take it
   const ChainFrame& frame;
 };
