@@ -45,11 +45,30 @@ FlightRecord fly_straight(const FlightTask& task, const planning::LocalPlannerOp
 Result<OpenWorldScene> own_world(const FlightPlace& place) {
   auto world = simulation::read_sdf(place.file);
   if (!world) return world.error();
+  for (const std::string& warning : world->warnings) fmt::print(stderr, "pade fly: warning: {}\n", warning);
   auto scene = simulation::Scene::build(std::move(world).value());
   if (!scene) return Error{fmt::format("{}: {}", place.file.string(), scene.error().message)};
   auto surface = simulation::SurfaceDistance::build(*scene);
   if (!surface) return surface.error();
   return OpenWorldScene{std::move(scene).value(), std::move(surface).value(), place.start, place.goal, 0};
+}
+
+/// A way that is none, or that begins or ends within something.
+Status check_way(const FlightTask& task, double climb, double radius) {
+  constexpr double kShortest = 2;  // m
+  if (!((task.goal - task.start).norm() >= kShortest))
+    return Error{fmt::format("--start and --goal: found {:.2f} m between them, expected {} m or more",
+                             (task.goal - task.start).norm(), kShortest)};
+  const Eigen::Vector3d take_off = task.start - climb * Eigen::Vector3d::UnitZ();
+  for (const auto& [name, place] :
+       {std::pair{"--start", task.start}, std::pair{"the place of take-off", take_off},
+        std::pair{"--goal", task.goal}}) {
+    if (task.surface.touches(place, radius))
+      return Error{
+          fmt::format("{}: found a surface nearer than {} m to ({:.2f}, {:.2f}, {:.2f}), expected free space",
+                      name, radius, place.x(), place.y(), place.z())};
+  }
+  return {};
 }
 
 ordered_json parsed(const std::string& text) { return ordered_json::parse(text); }
@@ -129,6 +148,9 @@ Status Fleet::fly_one(std::size_t index) {
   const auto world = world_of(seed);
   if (!world) return world.error();
   const FlightTask task{world->scene, world->surface, world->start, world->goal, seed};
+  const bool chain = options_.flier == Flier::chain;
+  const auto& vehicle = chain ? options_.chain.planner.vehicle : options_.exact.planner.vehicle;
+  if (const Status s = check_way(task, chain ? options_.chain.climb : 0, vehicle.radius); !s) return s;
   return fly_with(index, task);
 }
 
