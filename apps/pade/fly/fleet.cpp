@@ -21,7 +21,13 @@ namespace pade::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace closed_loop;
+using closed_loop::ChainMoment;
+using closed_loop::FlightRecord;
+using closed_loop::FlightTask;
+using closed_loop::FlightWatch;
+using closed_loop::fly_chain;
+using closed_loop::fly_exact;
+using closed_loop::Outcome;
 using nlohmann::ordered_json;
 using simulation::OpenWorldScene;
 
