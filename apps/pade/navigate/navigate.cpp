@@ -204,7 +204,7 @@ void add_navigate(CLI::App& app, Context& context) {
       ->add_option(
           "log", arguments->log,
           "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md); or raw GNSS: "
-          "a file of RINEX 3 observations or libRSF ranges")
+          "a file of RINEX 3 observations, UBX or libRSF ranges")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");

@@ -16,7 +16,7 @@ struct RawGnssArguments {
   bool json = false;
 };
 
-/// Whether the path is a file of RINEX observations or libRSF ranges.
+/// Whether the path is a file of RINEX, UBX or libRSF ranges.
 bool is_raw_gnss_file(const std::string& path);
 
 /// Plays the raw GNSS of a folder or file and writes the output folder.

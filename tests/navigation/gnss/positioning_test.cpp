@@ -161,6 +161,23 @@ TEST(Positioning, FindsSlipsOfOneCycleAndHeedsFlags) {
   expect_truth(run, flight.receiver, 2e-3, 0.03, 5e-4);
 }
 
+TEST(Positioning, AJumpOfTheReceiversClockIsNoSlip) {
+  Flight flight;
+  const double jump = 1e-3 * kSpeedOfLight;
+  for (std::size_t i = 4; i < 8; ++i) {
+    flight.log.epochs[i].time = later(flight.log.epochs[i].time, 1e-3);
+    for (Signal& s : flight.log.epochs[i].signals) {
+      const bool beidou = s.satellite.system == System::beidou;
+      *s.pseudorange += jump;
+      *s.carrier += jump * carrier_frequency(s.satellite.system, beidou ? '2' : '1', 0) / kSpeedOfLight;
+    }
+  }
+  const RawRun run = run_raw(flight.log, {});
+  expect_truth(run, flight.receiver, 2e-3, 0.03, 5e-4);
+  EXPECT_EQ(run.epochs[4].step->slips, 0);
+  EXPECT_NEAR(run.epochs[4].step->clock_step, jump + 6, 0.1);
+}
+
 TEST(Positioning, NamesWhatCannotBeUsed) {
   Flight flight;
   const SatelliteId id = flight.high();

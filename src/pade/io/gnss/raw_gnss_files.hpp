@@ -1,6 +1,6 @@
-// Recordings of raw GNSS: RINEX 3 observations and navigation messages, and libRSF's ranges with known places
-// of the satellites. What is unusable is left out and named in the remarks of the log; a file that is
-// unusable as a whole is refused.
+// Recordings of raw GNSS: RINEX 3 observations and navigation messages, u-blox's UBX, and libRSF's ranges
+// with known places of the satellites. What is unusable is left out and named in the remarks of the log; a
+// file that is unusable as a whole is refused.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 namespace pade::io {
 
 /// What a file of raw GNSS holds, by its first line.
-enum class RawGnssKind { observations, navigation, known_ranges };
+enum class RawGnssKind { observations, navigation, known_ranges, ubx };
 
 /// Empty if the text is nothing of the kind.
 std::optional<RawGnssKind> raw_gnss_kind(std::string_view text);
@@ -34,6 +34,12 @@ Status parse_rinex_navigation(std::string_view text, std::string_view name, gnss
 /// Appends `pseudorange3` lines as known ranges and `point3` lines as true positions; other lines are passed
 /// over. Times count from the recording's zero. Errors: neither kind of line, or more than half of them bad.
 Status parse_known_ranges(std::string_view text, std::string_view name, gnss::RawLog& log);
+
+/// Appends the epochs (RXM-RAWX) of a UBX log, and what GPS satellites sent (RXM-SFRBX); the messages of
+/// other systems are not decoded, which a remark says. Left out, with a remark: messages with a wrong
+/// checksum, that are cut off or not as long as they say, epochs that repeat a time or go back. Other
+/// messages and text between them are passed over. Errors: no epoch.
+Status parse_ubx(std::string_view bytes, std::string_view name, gnss::RawLog& log);
 
 /// Reads a folder, or the folder of a file: with a file its observations (or known ranges) alone, with a
 /// folder all that there are; in both cases all navigation files, and files of known positions, beside them.

@@ -28,7 +28,7 @@ std::optional<std::vector<double>> numbers_of(const std::vector<std::string_view
 }
 
 /// libRSF numbers smartLoc's satellites in hundreds: GPS from 0, Galileo from 200, GLONASS from 300.
-std::optional<gnss::SatelliteId> satellite_of(double number) {
+std::optional<gnss::SatelliteId> numbered_satellite(double number) {
   constexpr std::array<gnss::System, 4> kHundreds{gnss::System::gps, gnss::System::beidou,
                                                   gnss::System::galileo, gnss::System::glonass};
   if (!(number >= 0 && number < 400) || number != std::floor(number)) return std::nullopt;
@@ -40,7 +40,7 @@ std::optional<gnss::SatelliteId> satellite_of(double number) {
 /// "pseudorange3 t range variance x y z satellite system elevation C/N0".
 bool add_range(const std::vector<double>& v, gnss::RawLog& log) {
   if (v.size() < 7 || !(v[2] > 0) || std::abs(v[0]) > 4e9) return false;
-  const auto satellite = satellite_of(v[6]);
+  const auto satellite = numbered_satellite(v[6]);
   const Eigen::Vector3d position(v[3], v[4], v[5]);
   if (!satellite || position.norm() < 7e6 || position.norm() > 1e8 || std::abs(v[1]) > 1e9) return false;
   const Time time = Time::from_seconds(v[0]);
@@ -66,7 +66,8 @@ bool add_truth(const std::vector<double>& v, gnss::RawLog& log) {
 }
 
 struct Files {
-  std::vector<fs::path> observations, navigation, ranges;
+  std::vector<fs::path> observations;  ///< RINEX or UBX
+  std::vector<fs::path> navigation, ranges;
 };
 
 std::optional<RawGnssKind> kind_of(const fs::path& path) {
@@ -87,7 +88,7 @@ Files files_in(const fs::path& folder) {
   Files files;
   for (const fs::path& path : all) {
     const auto kind = kind_of(path);
-    if (kind == RawGnssKind::observations) files.observations.push_back(path);
+    if (kind == RawGnssKind::observations || kind == RawGnssKind::ubx) files.observations.push_back(path);
     if (kind == RawGnssKind::navigation) files.navigation.push_back(path);
     if (kind == RawGnssKind::known_ranges) files.ranges.push_back(path);
   }
@@ -104,6 +105,11 @@ Status read_all(const std::vector<fs::path>& files, Parse parse, gnss::RawLog& l
   return {};
 }
 
+Status parse_observations(std::string_view text, std::string_view name, gnss::RawLog& log) {
+  return raw_gnss_kind(text) == RawGnssKind::ubx ? parse_ubx(text, name, log)
+                                                 : parse_rinex_observations(text, name, log);
+}
+
 }  // namespace
 
 std::optional<RawGnssKind> raw_gnss_kind(std::string_view text) {
@@ -113,6 +119,7 @@ std::optional<RawGnssKind> raw_gnss_kind(std::string_view text) {
     if (line[20] == 'N') return RawGnssKind::navigation;
     return std::nullopt;
   }
+  if (text.starts_with("\xB5\x62")) return RawGnssKind::ubx;
   const auto fields = split_fields(line);
   if (fields.size() < 4) return std::nullopt;
   for (const std::string_view word : {"pseudorange3", "odom3", "point3"}) {
@@ -152,12 +159,12 @@ Result<gnss::RawLog> read_raw_gnss(const std::filesystem::path& path) {
   Files files = files_in(folder ? path : absolute_path(path).parent_path());
   if (!folder) {
     const auto kind = kind_of(path);
-    if (kind != RawGnssKind::observations && kind != RawGnssKind::known_ranges) {
-      return Error{
-          fmt::format("{}: expected RINEX 3 observations or libRSF's pseudorange3 lines", path.string())};
+    if (!kind || kind == RawGnssKind::navigation) {
+      return Error{fmt::format("{}: expected RINEX 3 observations, UBX, or libRSF's pseudorange3 lines",
+                               path.string())};
     }
     files.observations.clear();
-    if (kind == RawGnssKind::observations) {
+    if (kind != RawGnssKind::known_ranges) {
       files.observations = {path};
       files.ranges.clear();
     }
@@ -168,18 +175,18 @@ Result<gnss::RawLog> read_raw_gnss(const std::filesystem::path& path) {
   }
   gnss::RawLog log;
   for (const Status& read : {read_all(files.navigation, parse_rinex_navigation, log),
-                             read_all(files.observations, parse_rinex_observations, log),
+                             read_all(files.observations, parse_observations, log),
                              read_all(files.ranges, parse_known_ranges, log)}) {
     if (!read) return read.error();
   }
   if (log.epochs.empty() && log.known_ranges.empty()) {
-    return Error{
-        fmt::format("{}: found no raw GNSS, expected RINEX 3 observations or libRSF's pseudorange3 lines",
-                    path.string())};
+    return Error{fmt::format(
+        "{}: found no raw GNSS, expected RINEX 3 observations, UBX, or libRSF's pseudorange3 lines",
+        path.string())};
   }
   if (!log.epochs.empty() && log.broadcast.kepler.empty() && log.broadcast.glonass.empty()) {
-    return Error{
-        fmt::format("{}: found observations but no RINEX 3 navigation file beside them", path.string())};
+    return Error{fmt::format(
+        "{}: found observations but no ephemeris: no RINEX 3 navigation file beside them", path.string())};
   }
   return log;
 }

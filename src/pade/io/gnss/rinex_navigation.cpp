@@ -10,11 +10,35 @@
 #include "pade/io/text.hpp"
 
 namespace pade::io {
+
+namespace rinex {
+
+Time nearest_week(double of_week, Time near) {
+  constexpr std::int64_t kWeekLength = 604800 * kNanoseconds;
+  const auto wanted = static_cast<std::int64_t>(std::llround(of_week * 1e9));
+  const std::int64_t week = (near.nanoseconds - wanted + kWeekLength / 2) / kWeekLength;
+  return {wanted + week * kWeekLength};
+}
+
+std::string defect_of(const gnss::KeplerEphemeris& e) {
+  if (!(e.sqrt_a > 2000 && e.sqrt_a < 10000))
+    return fmt::format("sqrt(a) = {}, expected 2000 to 10000", e.sqrt_a);
+  if (!(e.eccentricity >= 0 && e.eccentricity < 0.7)) {
+    return fmt::format("e = {}, expected 0 to 0.7", e.eccentricity);
+  }
+  if (!(e.toe_of_week >= 0 && e.toe_of_week <= 604800)) {
+    return fmt::format("toe = {}, expected 0 to 604800", e.toe_of_week);
+  }
+  if (!(std::abs(e.af0) < 0.1)) return fmt::format("af0 = {}, expected less than 0.1 s", e.af0);
+  return {};
+}
+
+}  // namespace rinex
+
 namespace {
 
 using namespace rinex;  // NOLINT: the file is about nothing else
 
-constexpr std::int64_t kWeek = 604800 * kNanoseconds;
 constexpr std::size_t kMostValues = 40;
 constexpr int kBeidouBehind = 14;  // seconds of BeiDou time behind GPS time
 
@@ -47,28 +71,6 @@ std::optional<Time> date_of(std::string_view line) {
     date.at(i) = *value;
   }
   return time_of_date(date[0], date[1], date[2], date[3], date[4], date[5]);
-}
-
-/// A time of week as the moment of that kind that is nearest to another: the week's number, which files have
-/// with and without its rollover, is not needed.
-Time nearest_week(double of_week, Time near) {
-  const auto wanted = static_cast<std::int64_t>(std::llround(of_week * 1e9));
-  const std::int64_t week = (near.nanoseconds - wanted + kWeek / 2) / kWeek;
-  return {wanted + week * kWeek};
-}
-
-/// Why no orbit has these elements; empty if one may have them.
-std::string defect_of(const gnss::KeplerEphemeris& e) {
-  if (!(e.sqrt_a > 2000 && e.sqrt_a < 10000))
-    return fmt::format("sqrt(a) = {}, expected 2000 to 10000", e.sqrt_a);
-  if (!(e.eccentricity >= 0 && e.eccentricity < 0.7)) {
-    return fmt::format("e = {}, expected 0 to 0.7", e.eccentricity);
-  }
-  if (!(e.toe_of_week >= 0 && e.toe_of_week <= 604800)) {
-    return fmt::format("toe = {}, expected 0 to 604800", e.toe_of_week);
-  }
-  if (!(std::abs(e.af0) < 0.1)) return fmt::format("af0 = {}, expected less than 0.1 s", e.af0);
-  return {};
 }
 
 /// The group delay of the first band. Galileo's clock is of E1 and E5a (F/NAV) or of E1 and E5b (I/NAV).
@@ -148,7 +150,7 @@ std::string keep(const Record& record, gnss::BroadcastData& broadcast) {
     return defect;
   }
   const auto e = kepler_of(record);
-  std::string defect = defect_of(e);
+  std::string defect = rinex::defect_of(e);
   if (defect.empty()) broadcast.kepler.push_back(e);
   return defect;
 }

@@ -54,6 +54,13 @@ Result<double> check_first_line(std::string_view line, char type, const std::str
 /// "name: line 12".
 std::string at_line(std::string_view name, std::size_t line);
 
+/// A time of week as the moment of that kind that is nearest to another: the week's number, which files have
+/// with and without its rollover, is not needed.
+Time nearest_week(double of_week, Time near);
+
+/// Why no orbit has these elements; empty if one may have them.
+std::string defect_of(const gnss::KeplerEphemeris& e);
+
 /// Remarks of one kind: the first is told with its place, the others are counted.
 class Tally {
  public:

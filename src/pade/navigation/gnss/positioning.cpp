@@ -132,16 +132,89 @@ void take(const Estimate& estimate, Fix& fix) {
   fix.chi_square = estimate.chi_square;
 }
 
-/// Whether the change of a phase can be used: neither flagged nor against the Doppler.
-bool is_continuous(const Signal& before, const Signal& now, double wavelength, double interval) {
-  if (now.lost_lock || now.half_cycle != before.half_cycle || now.code != before.code) return false;
-  if (!before.doppler || !now.doppler) return true;
-  const double by_doppler = -0.5 * (*before.doppler + *now.doppler) * interval;
-  return std::abs(*now.carrier - *before.carrier - by_doppler) * wavelength <
-         std::max(0.5, 2 * std::abs(interval));
+/// A satellite whose phase is known at both epochs.
+struct PhasePair {
+  const SatelliteView* before = nullptr;
+  SatelliteView* now = nullptr;
+  std::optional<double> surplus;  ///< change of the phase beyond that of the mean Doppler, m
+};
+
+bool is_flagged(const Signal& before, const Signal& now) {
+  return now.lost_lock || now.half_cycle != before.half_cycle || now.code != before.code;
+}
+
+/// What all phases have gained over their Doppler: a jump of the receiver's clock, which is no slip.
+double common_surplus(std::span<const PhasePair> pairs) {
+  std::array<double, kMost> values{};
+  std::size_t count = 0;
+  for (const PhasePair& pair : pairs) {
+    if (pair.surplus) values.at(count++) = *pair.surplus;
+  }
+  if (count == 0) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
+  return *middle;
 }
 
 bool has_state(const SatelliteView& view) { return view.use == Use::used || view.use == Use::outlier; }
+
+struct PhasePairs {
+  std::array<PhasePair, kMost> all;
+  std::size_t size = 0;
+};
+
+/// The phases that go on from one epoch to the other; the count of those that are flagged or contradict the
+/// Doppler, which become outliers.
+int pair_phases(std::span<const SatelliteView> before, std::span<SatelliteView> now, double interval,
+                PhasePairs& pairs) {
+  int refused = 0;
+  for (SatelliteView& view : now) {
+    view.phase_use = has_state(view) ? Use::not_measured : view.use;
+    const auto old = std::find_if(before.begin(), before.end(),
+                                  [&](const auto& v) { return v.satellite == view.satellite; });
+    if (!has_state(view) || old == before.end() || !has_state(*old) || view.signal == nullptr ||
+        !view.signal->carrier || !old->signal->carrier || pairs.size == kMost) {
+      continue;
+    }
+    if (is_flagged(*old->signal, *view.signal)) {
+      view.phase_use = Use::outlier;
+      ++refused;
+      continue;
+    }
+    PhasePair pair{&*old, &view, {}};
+    if (old->signal->doppler && view.signal->doppler) {
+      const double by_doppler = -0.5 * (*old->signal->doppler + *view.signal->doppler) * interval;
+      pair.surplus = (*view.signal->carrier - *old->signal->carrier - by_doppler) * view.wavelength;
+    }
+    pairs.all.at(pairs.size++) = pair;
+  }
+  const double common = common_surplus(std::span(pairs.all).first(pairs.size));
+  const double gate = std::max(0.5, 2 * std::abs(interval));
+  const auto contradicts = [&](const PhasePair& pair) {
+    if (!pair.surplus || std::abs(*pair.surplus - common) < gate) return false;
+    pair.now->phase_use = Use::outlier;
+    ++refused;
+    return true;
+  };
+  const auto end = pairs.all.begin() + static_cast<std::ptrdiff_t>(pairs.size);
+  pairs.size =
+      static_cast<std::size_t>(std::remove_if(pairs.all.begin(), end, contradicts) - pairs.all.begin());
+  return refused;
+}
+
+/// The equation of a phase's change, while the receiver goes from one place to another.
+void add_phase(const PhasePair& pair, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+               const PositioningOptions& options, System64& system) {
+  const SatelliteView& old = *pair.before;
+  SatelliteView& view = *pair.now;
+  Equation& e = system.add(view);
+  e.coefficients.head<3>() = range_gradient(view.state.position, to);
+  e.coefficients[3] = 1;
+  e.value = view.wavelength * (*view.signal->carrier - *old.signal->carrier) +
+            kSpeedOfLight * (view.state.clock - old.state.clock) - (view.air_of_phase - old.air_of_phase) -
+            (range_between(view.state.position, to) - range_between(old.state.position, from));
+  e.sigma = M_SQRT2 * options.phase_sigma * noise_factor(view, options);
+}
 
 }  // namespace
 
@@ -202,38 +275,18 @@ std::optional<PhaseStep> step_between(std::span<const SatelliteView> before, std
   PhaseStep step;
   step.from = time_before;
   step.step = speed * interval;
+  PhasePairs pairs;
+  const int refused = pair_phases(before, now, interval, pairs);
   std::optional<Estimate> found;
-  int flagged = 0;
   for (int i = 0; i < 4; ++i) {
     System64 system;
-    flagged = 0;
-    for (SatelliteView& view : now) {
-      view.phase_use = has_state(view) ? Use::not_measured : view.use;
-      const auto old = std::find_if(before.begin(), before.end(),
-                                    [&](const auto& v) { return v.satellite == view.satellite; });
-      if (!has_state(view) || old == before.end() || !has_state(*old) || view.signal == nullptr ||
-          !view.signal->carrier || !old->signal->carrier || system.size == kMost) {
-        continue;
-      }
-      if (!is_continuous(*old->signal, *view.signal, view.wavelength, interval)) {
-        view.phase_use = Use::outlier;
-        ++flagged;
-        continue;
-      }
-      const Eigen::Vector3d place = position + step.step;
-      Equation& e = system.add(view);
-      e.coefficients.head<3>() = range_gradient(view.state.position, place);
-      e.coefficients[3] = 1;
-      e.value = view.wavelength * (*view.signal->carrier - *old->signal->carrier) +
-                kSpeedOfLight * (view.state.clock - old->state.clock) -
-                (view.air_of_phase - old->air_of_phase) -
-                (range_between(view.state.position, place) - range_between(old->state.position, position));
-      e.sigma = M_SQRT2 * options.phase_sigma * noise_factor(view, options);
+    for (const PhasePair& pair : std::span(pairs.all).first(pairs.size)) {
+      add_phase(pair, position, position + step.step, options, system);
     }
     found = solve_without_outliers(system.all(), options.outlier_gate);
     if (!found) return std::nullopt;
     step.step += found->x.head<3>();
-    step.slips = flagged;
+    step.slips = refused;
     for (std::size_t k = 0; k < system.size; ++k) {
       system.views.at(k)->phase_residual = system.equations.at(k).residual;
       system.views.at(k)->phase_use = system.equations.at(k).used ? Use::used : Use::outlier;

@@ -135,7 +135,7 @@ std::optional<VelocityFix> velocity_at(std::span<SatelliteView> views, const Eig
 
 /// Least squares on the change of the phases from `before` to `now`, both of which locate() has seen.
 /// A phase is refused if it or its half cycle is flagged, if it contradicts the mean Doppler by more than 2
-/// m/s or 0.5 m, or if it does not fit the others.
+/// m/s or 0.5 m (beside what all do alike: the receiver's clock may jump), or if it does not fit the others.
 /// @param position  of the epoch before
 /// @param speed     a rough velocity, ECEF, m/s
 std::optional<PhaseStep> step_between(std::span<const SatelliteView> before, std::span<SatelliteView> now,
