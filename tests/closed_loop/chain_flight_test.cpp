@@ -45,6 +45,19 @@ ChainRecord flown(const Place& place, double way, const ChainFlightOptions& opti
   return std::move(record).value();
 }
 
+TEST(ChainFlight, FindsAndCorrectsStampsThatAreLate) {
+  const Place place = columns({{5, 0.2}, {7, -2}});
+  ChainFlightOptions options = quick();
+  options.fault.kind = Fault::late_stamps;
+  options.fault.stamp_error = 0.04;
+  options.time_limit = 9;
+  const ChainRecord record = flown(place, 30, options);
+  EXPECT_NE(record.flight.outcome, Outcome::collided);
+  EXPECT_NEAR(record.stamp_correction, -0.04, 0.008);
+  ASSERT_FALSE(record.events.empty());
+  EXPECT_NE(record.events.front().find("ms late"), std::string::npos) << record.events.front();
+}
+
 TEST(ChainFlight, FliesAroundColumnsOnWhatItsCameraAndInstrumentsTellIt) {
   const Place place = columns({{5, 0.2}, {7, -2}});
   const ChainRecord record = flown(place, 9.5, quick());

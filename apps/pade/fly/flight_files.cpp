@@ -219,6 +219,7 @@ ordered_json measures_of(const FlightTask& task, const ChainRecord& r, double ra
   measures["frames_mapped"] = mapped;
   measures["frames_skipped"] = skipped;
   measures["seconds_blind"] = r.seconds_blind;
+  measures["stamp_correction_s"] = r.stamp_correction;
   measures["largest_drift_m"] = drift;
   measures["largest_tracking_error_m"] = tracking;
   return measures;

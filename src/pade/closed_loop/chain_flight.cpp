@@ -88,6 +88,7 @@ class ChainLoop {
   [[nodiscard]] cv::Mat picture(Time& stamp);
   void look(const cv::Mat& image, Time stamp);
   bool place(Time stamp, Pose& pose, Matrix6d& covariance);
+  void correct_stamps();
   void anchor(Time stamp);
   [[nodiscard]] MotionState start_of_plan(double effect) const;
   std::vector<MotionState> decide(double effect);
@@ -115,6 +116,7 @@ class ChainLoop {
   std::optional<std::pair<Time, Pose>> last_;  // frame, as navigation has it
   Matrix6d since_taken_ = Matrix6d::Zero();    // of the motion to it from the last one that the mapper took
   std::string skipped_;                        // why the last one was
+  double stamp_correction_ = 0;                // s, of what the camera says
   Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
   double last_depth_ = 0;
   cv::Mat frozen_, image_;
@@ -200,6 +202,8 @@ void ChainLoop::anchor(Time stamp) {
 
 void ChainLoop::look(const cv::Mat& image, Time stamp) {
   ChainFrame& out = record_.frames.back();
+  stamp.nanoseconds += std::llround(stamp_correction_ * 1e9);
+  stamp = std::min(stamp, vehicle_.truth().time);  // an image is not from the future
   Pose pose;
   Matrix6d covariance;
   if (!place(stamp, pose, covariance)) {
@@ -231,6 +235,21 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
   out.views = update.views;
   out.refined = update.refinement.outcome == depth::RefinementOutcome::refined;
   view_ = view_->after(mapper_.map(), update.change);
+  correct_stamps();
+}
+
+/// Images and poses tell different times: from now on the camera's stamps are corrected, that of the last
+/// frame included.
+void ChainLoop::correct_stamps() {
+  const std::optional<StampOffset>& offset = mapper_.health().stamp_offset;
+  if (!offset || !offset->is_certain()) return;
+  stamp_correction_ += offset->seconds;
+  last_->first.nanoseconds += std::llround(offset->seconds * 1e9);
+  say(fmt::format(
+      "the images show that their stamps are {:.1f} ms {} ({:.1f} ms, 1 sigma): corrected by {:.1f} ms",
+      1e3 * std::abs(offset->seconds), offset->seconds < 0 ? "late" : "early", 1e3 * offset->sigma,
+      1e3 * stamp_correction_));
+  mapper_.forget_stamp_offset();
 }
 
 /// Where the vehicle will be when the plan that is made now takes effect.
@@ -314,6 +333,7 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
     record_.flight = watch_.finished(outcome, climbed_);
     record_.view = view_;
     record_.climbed = climbed_;
+    record_.stamp_correction = stamp_correction_;
     record_.mapper = std::make_shared<ObstacleMapper>(std::move(mapper_));
     for (const ChainFrame& f : record_.frames) record_.seconds_blind += f.blind ? 1 / options_.frame_rate : 0;
     return std::move(record_);
