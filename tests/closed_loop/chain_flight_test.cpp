@@ -4,32 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include "columns.hpp"
+
 namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
 using namespace pade::simulation;
-
-struct Place {
-  Scene scene;
-  SurfaceDistance surface;
-};
-
-/// Textured columns on textured ground under a blank sky.
-Place columns(const std::vector<Eigen::Vector2d>& at) {
-  World world;
-  Material stone;
-  stone.pattern.kind = PatternKind::gravel;
-  world.visuals.push_back({"ground", {}, Rectangle{Vector3d::UnitZ(), {200, 200}}, stone, true});
-  for (const auto& p : at)
-    world.visuals.push_back(
-        {"column", {Eigen::Quaterniond::Identity(), {p.x(), p.y(), 2}}, Cylinder{0.3, 4}, stone, true});
-  auto scene = Scene::build(std::move(world));
-  EXPECT_TRUE(scene.ok());
-  auto surface = SurfaceDistance::build(*scene);
-  EXPECT_TRUE(surface.ok());
-  return {std::move(scene).value(), std::move(surface).value()};
-}
 
 ChainFlightOptions quick() {
   ChainFlightOptions options;

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/closed_loop/passer_by.hpp"
 #include "pade/core/option_check.hpp"
 #include "pade/planning/local_window.hpp"
 #include "pade/planning/map_space.hpp"
@@ -78,6 +79,8 @@ class ChainLoop {
         maker_(task.scene, camera_, frame_options(options, task.seed)),
         watch_(task, options.planner.vehicle.radius) {}
 
+  /// Somebody will cross the way.
+  void await(PasserBy passer_by) { passer_by_ = std::move(passer_by); }
   Result<ChainRecord> run(const std::function<bool(const ChainMoment&)>& observer);
 
  private:
@@ -93,6 +96,7 @@ class ChainLoop {
   [[nodiscard]] MotionState start_of_plan(double effect) const;
   std::vector<MotionState> decide(double effect);
   bool fly_until(int tick);
+  void look_at_passer_by();
   void say(const std::string& what) { record_.events.push_back(fmt::format("{:.1f} s: {}", now(), what)); }
 
   const FlightTask& task_;
@@ -103,6 +107,8 @@ class ChainLoop {
   ObstacleMapper mapper_;
   std::shared_ptr<const mapping::MapView> view_;
   simulation::FrameMaker maker_;
+  std::optional<PasserBy> passer_by_;
+  bool touched_ = false;  // by it
   FlightWatch watch_;
   std::optional<planning::LocalPlanner> planner_;
   planning::LocalWindow window_;
@@ -167,6 +173,7 @@ cv::Mat ChainLoop::picture(Time& stamp) {
   if (fault.is_on(Fault::frozen_camera, now()) && !frozen_.empty()) return frozen_;
   const auto pose_at = [&](double offset) { return body_pose(moved(at, offset)) * T_body_camera_; };
   simulation::Rendering light = maker_.expose(pose_at(0), pose_at);
+  if (passer_by_) passer_by_->draw(light, pose_at(0), at.time.seconds() - take_off_);
   if (fault.kind == Fault::exposure_jump) {
     const bool bright = static_cast<int>(std::floor(now())) % 2 == 0;
     light.radiance *= bright ? 1.4 : 0.7;
@@ -291,6 +298,17 @@ std::vector<MotionState> ChainLoop::decide(double effect) {
   return plan.motion;
 }
 
+/// Whoever walks into a vehicle that stands is no mistake of the vehicle: it is said, and the flight goes on.
+void ChainLoop::look_at_passer_by() {
+  if (!passer_by_) return;
+  const double distance = passer_by_->distance(vehicle_.truth().position, now());
+  record_.passer_by_clearance = std::min(record_.passer_by_clearance.value_or(distance), distance);
+  if (distance >= options_.planner.vehicle.radius || touched_) return;
+  touched_ = true;
+  say(fmt::format("the passer-by touches the vehicle, which flies at {:.1f} m/s",
+                  vehicle_.truth().velocity.norm()));
+}
+
 /// False if it touches something or believes itself at the goal.
 bool ChainLoop::fly_until(int tick) {
   constexpr int kLookEvery = 2;  // steps: 100 Hz
@@ -302,6 +320,7 @@ bool ChainLoop::fly_until(int tick) {
                  T_map_smooth_, time);
     if (tick_ % kLookEvery != 0) continue;
     if (!watch_.look(level(vehicle_.truth(), now()))) return false;
+    look_at_passer_by();
     const Vector3d left = T_map_world_ * goal_ - vehicle_.believed().translation;
     if (left.head<2>().norm() < options_.planner.arrival) return false;
   }
@@ -387,7 +406,14 @@ Result<ChainRecord> fly_chain(const FlightTask& task, const ChainFlightOptions& 
   auto mapper = ObstacleMapper::create(forward_camera(options.width), options.mapper);
   if (!mapper) return mapper.error();
   const Vector3d way = task.goal - task.start;
-  return ChainLoop(task, options, std::move(mapper).value(), std::atan2(way.y(), way.x())).run(observer);
+  ChainLoop loop(task, options, std::move(mapper).value(), std::atan2(way.y(), way.x()));
+  if (options.fault.kind == Fault::crossing) {
+    auto passer_by = PasserBy::create(task, forward_camera(options.width), frame_options(options, task.seed),
+                                      options.fault.crossing_ahead, options.fault.from);
+    if (!passer_by) return passer_by.error();
+    loop.await(std::move(passer_by).value());
+  }
+  return loop.run(observer);
 }
 
 }  // namespace pade::closed_loop
