@@ -17,6 +17,7 @@
 #include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
+#include "pade/live/recordings/tlog.hpp"
 #include "pade/navigation/navigation_run.hpp"
 #include "pade/pipeline/checked_log.hpp"
 #include "pade/report/navigation_report.hpp"
@@ -134,13 +135,24 @@ nlohmann::ordered_json summary(const NavigationRun& run, const Score& score, con
   return json;
 }
 
+/// A folder, or a recording of MAVLink.
+Result<CheckedLog> read_log(const NavigateArguments& arguments) {
+  if (live::is_tlog(arguments.log)) {
+    if (!arguments.gnss.empty()) return Error{"--gnss: a .tlog has one GNSS, expected a folder of files"};
+    auto sensors = live::read_tlog_sensors(arguments.log);
+    if (!sensors) return sensors.error();
+    return checked_log(std::move(*sensors));
+  }
+  io::NavigationLogOptions options;
+  options.gnss = arguments.gnss;
+  return read_checked_log(arguments.log, options);
+}
+
 Status navigate(const NavigateArguments& arguments) {
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kMarker);
   if (!output) return output.error();
-  io::NavigationLogOptions log_options;
-  log_options.gnss = arguments.gnss;
-  const auto checked = read_checked_log(arguments.log, log_options);
+  const auto checked = read_log(arguments);
   if (!checked) return checked.error();
   const NavigationLog* const log = &checked->log;
   const auto options = run_options(arguments, *log);
@@ -194,7 +206,8 @@ void add_navigate(CLI::App& app, Context& context) {
   auto arguments = std::make_shared<NavigateArguments>();
   command
       ->add_option("log", arguments->log,
-                   "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md)")
+                   "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, or a ground station's .tlog "
+                   "(docs/formats.md)")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");
