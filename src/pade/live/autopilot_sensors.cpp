@@ -25,10 +25,11 @@ constexpr std::uint8_t kPx4 = 12;
 constexpr double kMilliG = 9.80665e-3;
 constexpr double kMilli = 1e-3;
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kSlowestImu = 20;        // Hz: what lies between slower samples is lost
-constexpr double kVerticalVelocity = 10;  // sigma of one that is not measured, m/s
-constexpr double kFieldSigma = 0.05;      // as io::parse_magnetometer has it
-constexpr double kHeightSigma = 0.3;      // m, as io::parse_barometer has it
+constexpr std::uint64_t kLastDate = 4'600'000'000'000'000;  // the year 2115, µs
+constexpr double kSlowestImu = 20;                          // Hz: what lies between slower samples is lost
+constexpr double kVerticalVelocity = 10;                    // sigma of one that is not measured, m/s
+constexpr double kFieldSigma = 0.05;                        // as io::parse_magnetometer has it
+constexpr double kHeightSigma = 0.3;                        // m, as io::parse_barometer has it
 
 Vector3d flu_from_frd(const Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
@@ -70,14 +71,13 @@ std::string name_of(const Autopilot& autopilot) {
 
 void BootClock::learn(const Frame& frame) {
   const auto time = unpack<mavlink::SystemTime>(frame);
-  if (!time || time->time_unix_usec == 0) return;
+  if (!time || time->time_unix_usec == 0 || time->time_unix_usec > kLastDate) return;
   boot_since_1970_ =
       static_cast<std::int64_t>(time->time_unix_usec) - 1000 * static_cast<std::int64_t>(time->time_boot_ms);
 }
 
 std::optional<Time> BootClock::time_of(std::uint64_t microseconds) const {
-  constexpr std::uint64_t kFirstDate = 100'000'000'000'000;   // three years
-  constexpr std::uint64_t kLastDate = 4'600'000'000'000'000;  // the year 2115
+  constexpr std::uint64_t kFirstDate = 100'000'000'000'000;  // three years
   if (microseconds < kFirstDate) return Time{static_cast<std::int64_t>(microseconds) * 1000};
   if (!boot_since_1970_ || microseconds > kLastDate) return std::nullopt;
   return Time{(static_cast<std::int64_t>(microseconds) - *boot_since_1970_) * 1000};

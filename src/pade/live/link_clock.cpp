@@ -18,7 +18,9 @@ constexpr double kDrift = 30e-6;                  // of two quartz clocks agains
 
 void LinkClock::add(Time asked, Time answered, Time received) {
   const std::int64_t round_trip = received.nanoseconds - asked.nanoseconds;
+  constexpr std::int64_t kLast = 4'600'000'000'000'000'000;  // ns: differences of two times fit
   if (round_trip < 0 || round_trip > kLongest) return;
+  if (answered.nanoseconds > kLast || answered.nanoseconds < -kLast) return;
   const std::int64_t middle = asked.nanoseconds + round_trip / 2;
   const Sample sample{received, answered.nanoseconds - middle, round_trip};
   if (contradicts(sample)) {
