@@ -21,13 +21,14 @@
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/live/recordings/tlog.hpp"
+#include "pade/live/recordings/ulog.hpp"
 #include "pade/report/run_evaluation.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
 #include "info/calibration_info.hpp"
 #include "info/info_lines.hpp"
-#include "info/tlog_info.hpp"
+#include "info/recording_info.hpp"
 #include "plan/place_info.hpp"
 
 namespace pade::cli {
@@ -387,11 +388,12 @@ Status inform(const InfoArguments& arguments) {
   if (!fs::exists(path, code)) {
     return Error{
         fmt::format("{}: found nothing there, expected a sequence, a map (.bt, .ot), a calibration, a "
-                    "recording (.tlog) or a run",
+                    "recording (.tlog, .ulg) or a run",
                     arguments.path)};
   }
   if (!fs::is_directory(path, code)) {
     if (live::is_tlog(path)) return inform_of_tlog(path, arguments.json);
+    if (live::is_ulog(path)) return inform_of_ulog(path, arguments.json);
     const bool map = path.extension() == ".bt" || path.extension() == ".ot";
     return map ? inform_of_map(arguments) : inform_of_calibration(path, arguments.camera, arguments.json);
   }
@@ -417,8 +419,8 @@ void add_info(CLI::App& app, Context& context) {
       "  pade info flight.tlog      messages, and whether the sensors in them will do\n");
   command
       ->add_option("PATH", arguments->path,
-                   "Sequence, folder of sequences, map (.bt, .ot), calibration, ground station's recording "
-                   "(.tlog) or run")
+                   "Sequence, folder of sequences, map (.bt, .ot), calibration, recording of an "
+                   "autopilot (.tlog, .ulg) or run")
       ->required();
   command->add_option("--poses", arguments->poses, "groundtruth, original or a pose file")
       ->capture_default_str();

@@ -18,6 +18,7 @@
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
 #include "pade/live/recordings/tlog.hpp"
+#include "pade/live/recordings/ulog.hpp"
 #include "pade/navigation/navigation_run.hpp"
 #include "pade/pipeline/checked_log.hpp"
 #include "pade/report/navigation_report.hpp"
@@ -135,11 +136,13 @@ nlohmann::ordered_json summary(const NavigationRun& run, const Score& score, con
   return json;
 }
 
-/// A folder, or a recording of MAVLink.
+/// A folder, or an autopilot's recording.
 Result<CheckedLog> read_log(const NavigateArguments& arguments) {
-  if (live::is_tlog(arguments.log)) {
-    if (!arguments.gnss.empty()) return Error{"--gnss: a .tlog has one GNSS, expected a folder of files"};
-    auto sensors = live::read_tlog_sensors(arguments.log);
+  const bool px4 = live::is_ulog(arguments.log);
+  if (px4 || live::is_tlog(arguments.log)) {
+    if (!arguments.gnss.empty())
+      return Error{"--gnss: found a recording, which has one GNSS; expected a folder"};
+    auto sensors = px4 ? live::read_ulog_sensors(arguments.log) : live::read_tlog_sensors(arguments.log);
     if (!sensors) return sensors.error();
     return checked_log(std::move(*sensors));
   }
@@ -205,9 +208,10 @@ void add_navigate(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("navigate", "Trajectory and frame-to-frame motion from IMU and GNSS");
   auto arguments = std::make_shared<NavigateArguments>();
   command
-      ->add_option("log", arguments->log,
-                   "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, or a ground station's .tlog "
-                   "(docs/formats.md)")
+      ->add_option(
+          "log", arguments->log,
+          "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, a ground station's .tlog, or PX4's "
+          ".ulg (docs/formats.md)")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");

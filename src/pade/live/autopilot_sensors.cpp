@@ -4,10 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include <GeographicLib/LocalCartesian.hpp>
 #include <fmt/format.h>
 
-#include "pade/io/navigation/navigation_log.hpp"
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
 #include "pade/live/mavlink/link_messages.hpp"
@@ -27,7 +25,6 @@ constexpr double kMilli = 1e-3;
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::uint64_t kLastDate = 4'600'000'000'000'000;  // the year 2115, µs
 constexpr double kSlowestImu = 20;                          // Hz: what lies between slower samples is lost
-constexpr double kVerticalVelocity = 10;                    // sigma of one that is not measured, m/s
 constexpr double kFieldSigma = 0.05;                        // as io::parse_magnetometer has it
 constexpr double kHeightSigma = 0.3;                        // m, as io::parse_barometer has it
 
@@ -164,52 +161,14 @@ void SensorGatherer::add_fix(const Frame& frame) {
   }
   const bool on_earth = std::abs(m->lat) <= 900'000'000 && std::abs(static_cast<double>(m->lon)) <= 1.8e9;
   if (!time || !on_earth || repeats(fixes_, *time)) return;
-  Fix fix{*time,           1e-7 * m->lat,      1e-7 * m->lon,
-          kMilli * m->alt, kMilli * m->h_acc,  kMilli * m->v_acc,
-          std::nullopt,    kMilli * m->vel_acc};
+  GeodeticFix fix{
+      *time, 1e-7 * m->lat,       1e-7 * m->lon, kMilli * m->alt, kMilli * m->h_acc, kMilli * m->v_acc,
+      {},    kMilli * m->vel_acc, false};
   if (m->vel != kUnknown && m->cog != kUnknown) {
     const double course = 0.01 * m->cog * kDegree;
-    fix.velocity = 0.01 * m->vel * Eigen::Vector2d(std::sin(course), std::cos(course));
+    fix.velocity = 0.01 * m->vel * Vector3d(std::sin(course), std::cos(course), 0);
   }
   fixes_.push_back(fix);
-}
-
-GnssLog SensorGatherer::gnss(std::vector<std::string>& remarks) const {
-  const io::GnssDefaults defaults;
-  GnssLog log;
-  const Fix& first = fixes_.front();
-  log.origin = GeodeticOrigin{first.latitude, first.longitude, first.height};
-  const GeographicLib::LocalCartesian frame(first.latitude, first.longitude, first.height);
-  std::size_t position_defaults = 0, velocity_defaults = 0;
-  const auto stated = [](double sigma, double otherwise, std::size_t& count) {
-    if (sigma > 0) return sigma;
-    ++count;
-    return otherwise;
-  };
-  for (const Fix& fix : fixes_) {
-    Vector3d place;
-    frame.Forward(fix.latitude, fix.longitude, fix.height, place.x(), place.y(), place.z());
-    const double across = stated(fix.horizontal, defaults.position_horizontal, position_defaults);
-    const double up = fix.vertical > 0 ? fix.vertical : defaults.position_vertical;
-    log.fixes.push_back({fix.time, place, Vector3d(across * across, across * across, up * up).asDiagonal()});
-    if (!fix.velocity) continue;
-    const double sigma = stated(fix.velocity_sigma, defaults.velocity_horizontal, velocity_defaults);
-    const Vector3d variances(sigma * sigma, sigma * sigma, kVerticalVelocity * kVerticalVelocity);
-    log.velocities.push_back({fix.time, {fix.velocity->x(), fix.velocity->y(), 0}, variances.asDiagonal()});
-  }
-  if (position_defaults > 0) {
-    remarks.push_back(fmt::format(
-        "GPS_RAW_INT: {} of {} positions state no accuracy: {} m and {} m vertically", position_defaults,
-        log.fixes.size(), defaults.position_horizontal, defaults.position_vertical));
-  }
-  if (velocity_defaults > 0) {
-    remarks.push_back(fmt::format("GPS_RAW_INT: {} of {} velocities state no accuracy: {} m/s",
-                                  velocity_defaults, log.velocities.size(), defaults.velocity_horizontal));
-  }
-  if (!log.velocities.empty()) {
-    remarks.emplace_back("GPS_RAW_INT: has no vertical velocity, which is left open");
-  }
-  return log;
 }
 
 Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
@@ -239,7 +198,7 @@ Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
   }
   log.magnetometer = longest(fields_);
   log.barometer = longest(heights_);
-  log.gnss = gnss(log.remarks);
+  log.gnss = local_log(fixes_, "GPS_RAW_INT", log.remarks);
   return log;
 }
 

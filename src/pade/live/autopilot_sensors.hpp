@@ -12,6 +12,7 @@
 #include "pade/core/result.hpp"
 #include "pade/core/sensors/navigation_log.hpp"
 #include "pade/core/time.hpp"
+#include "pade/live/geodetic_fixes.hpp"
 #include "pade/live/mavlink/frame.hpp"
 
 namespace pade::live {
@@ -61,27 +62,19 @@ class SensorGatherer {
 
  private:
   enum Source : std::uint8_t { highres, scaled, raw };
-  struct Fix {
-    Time time;
-    double latitude, longitude, height;       // degrees, m
-    double horizontal, vertical;              // sigmas, m; 0: not stated
-    std::optional<Eigen::Vector2d> velocity;  // east, north, m/s
-    double velocity_sigma;                    // m/s; 0: not stated
-  };
   template <class Message>
   void add_integers(const Message& message, Time time, Source source);
   void add_highres(const mavlink::Frame& frame);
   void add_pressure(std::optional<Time> time, double hectopascal, Source source);
   void add_fix(const mavlink::Frame& frame);
   void add_field(Time time, const Eigen::Vector3d& frd, Source source);
-  [[nodiscard]] GnssLog gnss(std::vector<std::string>& remarks) const;
 
   Autopilot autopilot_;
   BootClock clock_;
   std::array<std::vector<ImuSample>, 3> imu_;  // by source
   std::array<std::vector<MagneticField>, 3> fields_;
   std::array<std::vector<BarometricHeight>, 2> heights_;  // HIGHRES_IMU, SCALED_PRESSURE
-  std::vector<Fix> fixes_;
+  std::vector<GeodeticFix> fixes_;
   std::size_t unitless_ = 0;  // RAW_IMU of somebody whose units nobody knows
   std::size_t without_fix_ = 0;
 };

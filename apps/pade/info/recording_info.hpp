@@ -1,4 +1,4 @@
-// What `pade info` says of a ground station's recording.
+// What `pade info` says of the recordings of autopilots.
 #pragma once
 
 #include <filesystem>
@@ -9,5 +9,8 @@ namespace pade::cli {
 
 /// Prints packets, messages and their rates, and what its sensors are good for. Errors: live::read_tlog.
 Status inform_of_tlog(const std::filesystem::path& file, bool as_json);
+
+/// Prints topics and their rates, and what its sensors are good for. Errors: live::Ulog::parse.
+Status inform_of_ulog(const std::filesystem::path& file, bool as_json);
 
 }  // namespace pade::cli
