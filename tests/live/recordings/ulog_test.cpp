@@ -184,7 +184,7 @@ TEST_P(UlogRecording, HasTheSensorsThatWereCounted) {
 INSTANTIATE_TEST_SUITE_P(Real, UlogRecording,
                          testing::Values(RealLog{"sample_log_small.ulg", 1298, 32, 319, 120},
                                          RealLog{"sample_px4_events.ulg", 7783, 423, 459, 623},
-                                         RealLog{"sample_logging_tagged_and_default_params.ulg", 2028, 190,
+                                         RealLog{"sample_logging_tagged_and_default_params.ulg", 2028, 30,
                                                  159, 202}));
 
 /// Every number of the topics that we use, as another program reads it.
