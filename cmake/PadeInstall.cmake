@@ -33,6 +33,7 @@ set(pade_public_headers
   depth/motion/baseline_window.hpp
   depth/motion/motion_alignment.hpp
   depth/motion/motion_refinement.hpp
+  depth/motion/stamp_clock.hpp
   depth/multi_view/common_error.hpp
   depth/multi_view/views_depth.hpp
   mapping/occupancy_map.hpp

@@ -22,6 +22,8 @@
 
 #ifdef PADE_HAS_SIMULATION
 #include "pade/simulation/generator/paper_set_files.hpp"
+
+#include "fly/grid.hpp"
 #endif
 
 namespace pade::cli {
@@ -169,6 +171,28 @@ Status merge(const ExperimentArguments& arguments) {
   return finish(arguments, *experiment, *store);
 }
 
+/// Of the options, those of tables do not belong here.
+Status fly([[maybe_unused]] const ExperimentArguments& arguments) {
+#ifdef PADE_HAS_SIMULATION
+  if (!arguments.sequences.empty() || !arguments.set.empty() || !arguments.flows.empty())
+    return Error{"fly: found --sequences, --set or --flow, expected none of them (they are of the tables)"};
+  const auto share = share_of(arguments);
+  if (!share) return share.error();
+  GridOptions options;
+  options.configurations = arguments.folders;
+  options.out = arguments.out;
+  options.threads = arguments.jobs;
+  options.shard = share->shard;
+  options.shards = share->shards;
+  options.quick = arguments.quick;
+  options.force = arguments.force;
+  options.json = arguments.json;
+  return fly_grid(options);
+#else
+  return Error{"this build has no simulator to fly in (pade simulate says what is missing)"};
+#endif
+}
+
 }  // namespace
 
 void add_experiment(CLI::App& app, Context& context) {
@@ -184,6 +208,8 @@ void add_experiment(CLI::App& app, Context& context) {
       "worth\n"
       "beyond    past the paper: the chain of `pade map`, one step after the other, exact and noisy poses\n"
       "all       all but beyond in one report.html                       merge     tables from shards\n"
+      "fly       the flights of docs/fly.md: chain exact straight, or the configurations and faults that are "
+      "named, or all\n"
       "The folder OUT keeps every finished job: the same command goes on where an earlier one was cut "
       "short.\n"
       "Examples:\n"
@@ -191,17 +217,20 @@ void add_experiment(CLI::App& app, Context& context) {
       "  pade experiment table1 --sequences DATA/redkitchen_sideways --step 2 --out kitchen\n"
       "  pade experiment all --shard 1/3 --out part1   (and 2/3, 3/3), then\n"
       "  pade experiment merge part1 part2 part3 --out results\n"
+      "  pade experiment fly chain gust --out flights --jobs 2   (--shard 1/3 too; the table by the same "
+      "command without it)\n"
       "docs/experiments.md tells more.");
   std::vector<std::string> names(experiment::table_names.begin(), experiment::table_names.end());
-  names.insert(names.end(), {"all", "merge"});
-  command->add_option("what", a->what, "table, figure, all or merge")
+  names.insert(names.end(), {"all", "merge", "fly"});
+  command->add_option("what", a->what, "table, figure, all, merge or fly")
       ->required()
       ->check(CLI::IsMember(names));
-  command->add_option("folders", a->folders, "merge: folders of the shards");
+  command->add_option("folders", a->folders, "merge: folders of the shards; fly: configurations");
   command->add_option("-o,--out", a->out, "folder of the results, made by this command")->required();
   command->add_option("--sequences", a->sequences,
                       "folders of recordings with true depth, instead of the ten simulated sequences");
-  command->add_flag("--quick", a->quick, "a tenth of the frames of the simulated sequences");
+  command->add_flag("--quick", a->quick,
+                    "a tenth of the frames of the simulated sequences; fly: six flights of 20 m");
   command->add_option("--set", a->set, "folder of the simulated sequences (default: the user's cache)");
   command->add_option("--flow", a->flows, "optical-flow methods, instead of those of each table")
       ->delimiter(',')
@@ -226,7 +255,10 @@ void add_experiment(CLI::App& app, Context& context) {
   command->add_flag("--json", a->json, "print experiment.json instead of the tables");
   command->callback([a, &context] {
     io::watch_for_interrupts();
-    if (const Status status = a->what == "merge" ? merge(*a) : run_tables(*a); !status) {
+    if (const Status status = a->what == "merge" ? merge(*a)
+                              : a->what == "fly" ? fly(*a)
+                                                 : run_tables(*a);
+        !status) {
       fmt::print(stderr, "pade experiment: {}\n", status.error().message);
       context.exit_code = io::interrupted() ? 130 : 1;
     }

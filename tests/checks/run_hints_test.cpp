@@ -27,7 +27,7 @@ io::RunInfo good_run() {
   info.health.depth_images = 49;
   info.state_pixels = {700, 20, 100, 80, 50, 50, 0};
   info.map = io::MapSummary{0.1, 500, 9000, 700, 50, 200, 0, 3000};
-  info.motion = {49, 0, 0.2, 0, 0};
+  info.motion = {49, 0, 0.2, 0, 0, {}};
   return info;
 }
 
@@ -136,9 +136,19 @@ INSTANTIATE_TEST_SUITE_P(
                     HintCase{"Hover",
                              [](io::RunInfo& run) {
                                only(run, DepthState::low_parallax);
-                               run.motion = {49, 49, 0.001, 0, 0};
+                               run.motion = {49, 49, 0.001, 0, 0, {}};
                              },
                              "standing-still", "100 %", "--step"},
+                    HintCase{"LateStamps",
+                             [](io::RunInfo& run) {
+                               run.motion.stamp_offset = StampOffset{-0.0312, 0.001, 20};
+                             },
+                             "stamps-late", "31.2 ms late", "add -0.0312 to time_offset_s"},
+                    HintCase{"EarlyStamps",
+                             [](io::RunInfo& run) {
+                               run.motion.stamp_offset = StampOffset{0.0312, 0.001, 20};
+                             },
+                             "stamps-early", "31.2 ms early", "add 0.0312 to time_offset_s"},
                     HintCase{"LowParallax", [](io::RunInfo& run) { only(run, DepthState::low_parallax); },
                              "mostly-unmeasured", "hardly moves", "--step"},
                     HintCase{"AtTheEpipole", [](io::RunInfo& run) { only(run, DepthState::epipole); },

@@ -4,32 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include "columns.hpp"
+
 namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
 using namespace pade::simulation;
-
-struct Place {
-  Scene scene;
-  SurfaceDistance surface;
-};
-
-/// Textured columns on textured ground under a blank sky.
-Place columns(const std::vector<Eigen::Vector2d>& at) {
-  World world;
-  Material stone;
-  stone.pattern.kind = PatternKind::gravel;
-  world.visuals.push_back({"ground", {}, Rectangle{Vector3d::UnitZ(), {200, 200}}, stone, true});
-  for (const auto& p : at)
-    world.visuals.push_back(
-        {"column", {Eigen::Quaterniond::Identity(), {p.x(), p.y(), 2}}, Cylinder{0.3, 4}, stone, true});
-  auto scene = Scene::build(std::move(world));
-  EXPECT_TRUE(scene.ok());
-  auto surface = SurfaceDistance::build(*scene);
-  EXPECT_TRUE(surface.ok());
-  return {std::move(scene).value(), std::move(surface).value()};
-}
 
 ChainFlightOptions quick() {
   ChainFlightOptions options;
@@ -43,6 +24,19 @@ ChainRecord flown(const Place& place, double way, const ChainFlightOptions& opti
   auto record = fly_chain({place.scene, place.surface, {0, 0, 1.6}, {way, 0, 1.6}, 3}, options);
   EXPECT_TRUE(record.ok());
   return std::move(record).value();
+}
+
+TEST(ChainFlight, FindsAndCorrectsStampsThatAreLate) {
+  const Place place = columns({{5, 0.2}, {7, -2}});
+  ChainFlightOptions options = quick();
+  options.fault.kind = Fault::late_stamps;
+  options.fault.stamp_error = 0.04;
+  options.time_limit = 9;
+  const ChainRecord record = flown(place, 30, options);
+  EXPECT_NE(record.flight.outcome, Outcome::collided);
+  EXPECT_NEAR(record.stamp_correction, -0.04, 0.008);
+  ASSERT_FALSE(record.events.empty());
+  EXPECT_NE(record.events.front().find("ms late"), std::string::npos) << record.events.front();
 }
 
 TEST(ChainFlight, FliesAroundColumnsOnWhatItsCameraAndInstrumentsTellIt) {

@@ -4,30 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include "columns.hpp"
+
 namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
 using namespace pade::simulation;
-
-struct Place {
-  Scene scene;
-  SurfaceDistance surface;
-};
-
-/// Columns on a meadow.
-Place columns(const std::vector<Eigen::Vector2d>& at) {
-  World world;
-  world.visuals.push_back({"meadow", {}, Rectangle{Vector3d::UnitZ(), {100, 100}}, {}, true});
-  for (const auto& p : at)
-    world.visuals.push_back(
-        {"column", {Eigen::Quaterniond::Identity(), {p.x(), p.y(), 2}}, Cylinder{0.25, 4}, {}, true});
-  auto scene = Scene::build(std::move(world));
-  EXPECT_TRUE(scene.ok());
-  auto surface = SurfaceDistance::build(*scene);
-  EXPECT_TRUE(surface.ok());
-  return {std::move(scene).value(), std::move(surface).value()};
-}
 
 ExactFlightOptions quick() {
   ExactFlightOptions options;

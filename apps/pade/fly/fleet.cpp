@@ -59,6 +59,24 @@ Result<OpenWorldScene> own_world(const FlightPlace& place) {
   return OpenWorldScene{std::move(scene).value(), std::move(surface).value(), place.start, place.goal, 0};
 }
 
+/// The same world with a goal nearer on the straight way, or a little beside it where something stands there.
+Result<OpenWorldScene> shortened(OpenWorldScene world, double way) {
+  constexpr double kRoom = 1;     // m about the goal
+  constexpr double kAside = 0.5;  // m
+  constexpr int kSteps = 16;
+  const Eigen::Vector3d along = (world.goal - world.start).normalized();
+  const Eigen::Vector3d left = Eigen::Vector3d::UnitZ().cross(along).normalized();
+  for (int step = 0; step < 2 * kSteps; ++step) {
+    const double aside = kAside * ((step + 1) / 2) * (step % 2 == 0 ? 1 : -1);
+    const Eigen::Vector3d goal = world.start + way * along + aside * left;
+    if (world.surface.touches(goal, kRoom) || !simulation::is_passable(world.surface, world.start, goal))
+      continue;
+    world.goal = goal;
+    return world;
+  }
+  return Error{fmt::format("--way: found no free place about {} m ahead, expected one (another seed)", way)};
+}
+
 /// A way that is none, or that begins or ends within something.
 Status check_way(const FlightTask& task, double climb, double radius) {
   constexpr double kShortest = 2;  // m
@@ -83,6 +101,7 @@ ordered_json record_of(const FleetOptions& options) {
   ordered_json made = {{"made_by", fmt::format("pade {} fly", version)}, {"world", options.place.name}};
   if (options.place.random) {
     made["density_per_ha"] = options.place.density;
+    if (options.place.way) made["way_m"] = *options.place.way;
   } else {
     const auto row = [](const Eigen::Vector3d& p) { return std::vector<double>{p.x(), p.y(), p.z()}; };
     made["start"] = row(options.place.start);
@@ -142,7 +161,9 @@ Result<OpenWorldScene> Fleet::world_of(std::uint64_t seed) {
   if (!place.random) return own_world(place);
   const fs::path file = default_cache() / "worlds" /
                         fmt::format("{}-{}-{}", place.name, seed, place.density) / (place.name + ".sdf");
-  return simulation::make_open_world(*place.random, seed, place.density, file);
+  auto world = simulation::make_open_world(*place.random, seed, place.density, file);
+  if (world && place.way) return shortened(std::move(world).value(), *place.way);
+  return world;
 }
 
 fs::path Fleet::folder_of(std::uint64_t seed) const { return options_.out / std::to_string(seed); }
@@ -151,7 +172,9 @@ Status Fleet::fly_one(std::size_t index) {
   if (const Status s = find_flown(index); !s) return s;
   if (!flown_[index].is_null()) return {};
   const std::uint64_t seed = options_.seeds[index];
-  const auto world = world_of(seed);
+  auto found = world_of(seed);
+  if (!found) return found.error();
+  const auto world = closed_loop::built_for(options_.chain.fault.kind, std::move(found).value());
   if (!world) return world.error();
   const FlightTask task{world->scene, world->surface, world->start, world->goal, seed};
   const bool chain = options_.flier == Flier::chain;
@@ -212,6 +235,13 @@ Status Fleet::find_flown(std::size_t index) {
                     file.string())};
   flown_[index] = found["flight"];
   return {};
+}
+
+ordered_json summary_of(const Fleet& fleet) {
+  ordered_json all = fleet.made_of();
+  all["totals"] = totals_of(fleet.flown());
+  all["flights"] = fleet.flown();
+  return all;
 }
 
 ordered_json totals_of(const std::vector<ordered_json>& flown) {

@@ -32,6 +32,7 @@ struct FlightPlace {
   std::string name;                                 ///< of the random world, or the file's
   std::optional<simulation::OpenWorldKind> random;  ///< empty: `file`
   double density = 400;                             ///< per hectare
+  std::optional<double> way;                        ///< to the goal of a random world, m; empty: 60
   std::filesystem::path file;
   Eigen::Vector3d start = Eigen::Vector3d::Zero(), goal = Eigen::Vector3d::Zero();  ///< of `file`, m
 };
@@ -79,6 +80,9 @@ class Fleet {
   Status failure_;
   std::function<void(std::size_t, const std::string&)> progress_;
 };
+
+/// flights.json: who made them, their totals, the flights.
+nlohmann::ordered_json summary_of(const Fleet& fleet);
 
 /// Counts of outcomes with exact 95 % intervals, and means.
 nlohmann::ordered_json totals_of(const std::vector<nlohmann::ordered_json>& flown);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "pade/closed_loop/world_measures.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/text.hpp"
@@ -167,7 +168,7 @@ std::string flight_page(const ordered_json& whole, const FlightTask& task, const
     body += "</div>\n";
   }
   body += "<h2>Over time</h2>\n<div class=\"views\">";
-  body += plot_of(flight, "true clearance", "to the nearest surface, at most 2 [m]",
+  body += plot_of(flight, "true clearance, at most 2 m", "[m]",
                   [](const FlightSample& s) { return s.clearance; });
   body += plot_of(flight, "speed", "[m/s]", [](const FlightSample& s) { return s.state.velocity.norm(); });
   body += "</div>\n<h2>What the camera saw</h2>\n" + strip.html();
@@ -192,6 +193,7 @@ Status write_all(const fs::path& folder, const Files& files) {
 
 ordered_json measures_of(const FlightTask& task, const FlightRecord& r, double radius) {
   const double way = (task.goal - task.start).norm();
+  const closed_loop::WorldMeasures world = closed_loop::measures_of_world(task, radius);
   return {{"outcome", to_name(r.outcome)},
           {"duration_s", r.duration},
           {"length_m", r.length},
@@ -200,6 +202,8 @@ ordered_json measures_of(const FlightTask& task, const FlightRecord& r, double r
           {"goal_distance_m", r.goal_distance},
           {"least_clearance_m", r.least_clearance},
           {"stops", r.stops},
+          {"traversability", world.traversability},
+          {"relative_gap", world.relative_gap ? ordered_json(*world.relative_gap) : ordered_json()},
           {"straight_way_is_free", straight_way_is_free(task, radius)}};
 }
 
@@ -219,6 +223,8 @@ ordered_json measures_of(const FlightTask& task, const ChainRecord& r, double ra
   measures["frames_mapped"] = mapped;
   measures["frames_skipped"] = skipped;
   measures["seconds_blind"] = r.seconds_blind;
+  if (r.passer_by_clearance) measures["passer_by_clearance_m"] = *r.passer_by_clearance;
+  measures["stamp_correction_s"] = r.stamp_correction;
   measures["largest_drift_m"] = drift;
   measures["largest_tracking_error_m"] = tracking;
   return measures;

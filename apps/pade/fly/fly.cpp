@@ -40,6 +40,7 @@ struct FlyArguments {
   std::string depth = "multi-view";
   std::string fault = "none";
   double density = 400;
+  std::optional<double> way;
   std::optional<double> speed;
   std::optional<int> width;
   int threads = 1;
@@ -93,6 +94,7 @@ Result<Eigen::Vector3d> parse_point(const std::string& option, const std::string
 Result<FlightPlace> place_of(const FlyArguments& arguments) {
   FlightPlace place;
   place.density = arguments.density;
+  place.way = arguments.way;
   if (arguments.world.empty() == arguments.random.empty())
     return Error{"found both or neither of WORLD and --random, expected one of them"};
   if (!arguments.random.empty()) {
@@ -105,6 +107,7 @@ Result<FlightPlace> place_of(const FlyArguments& arguments) {
       return Error{"--start and --goal: found with --random, whose worlds have a start and a goal"};
     return place;
   }
+  if (arguments.way) return Error{"--way: found with a world of your own, whose --goal says how far it is"};
   place.file = arguments.world;
   place.name = place.file.stem().string();
   const auto start = parse_point("--start", arguments.start);
@@ -215,9 +218,7 @@ Status fly(const FlyArguments& arguments) {
       !s)
     return s;
   if (io::interrupted()) return Error{"interrupted; with --out the flights that are finished are kept"};
-  ordered_json all = fleet.made_of();
-  all["totals"] = totals_of(fleet.flown());
-  all["flights"] = fleet.flown();
+  const ordered_json all = summary_of(fleet);
   const std::string text = all.dump(2) + "\n";
   if (!arguments.out.empty()) {
     const fs::path out = arguments.out;
@@ -251,6 +252,8 @@ void add_options(CLI::App& command, FlyArguments& a) {
       ->capture_default_str();
   command.add_option("--density", a.density, "of a random world, obstacles per hectare")
       ->capture_default_str();
+  command.add_option("--way", a.way, "how far away the goal of a random world is, m (default 60)")
+      ->check(CLI::Range(5.0, 60.0));
   command.add_option("--start", a.start, "x,y,z where the way begins, m");
   command.add_option("--goal", a.goal, "x,y,z where it ends, m");
   command

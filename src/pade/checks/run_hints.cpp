@@ -240,6 +240,15 @@ void add_of_pixels(const RunInfo& info, List& list) {
               "itself",
               "let `pade info FLIGHT` try the poses on the images; check time_offset_s and camera.yaml"});
   }
+  if (const auto& offset = info.motion.stamp_offset; offset && offset->is_certain()) {
+    const bool late = offset->seconds < 0;
+    list.add(late ? "stamps-late" : "stamps-early", HintSeverity::warning,
+             fmt::format("the images' stamps are {:.1f} ms {} (1 sigma {:.1f} ms, from {} uneven turns)",
+                         1e3 * std::abs(offset->seconds), late ? "late" : "early", 1e3 * offset->sigma,
+                         offset->pairs),
+             {"while the camera turns, poses and images are of different moments",
+              fmt::format("add {:.4f} to time_offset_s in camera.yaml", offset->seconds)});
+  }
   if (info.masked_share > kMost) {
     list.add("large-mask", HintSeverity::warning,
              fmt::format("{} of the image is masked", percent(info.masked_share)),

@@ -21,6 +21,7 @@ namespace pade::evaluation {
 ///   beyond-map        most depths lie beyond the range of the map
 ///   nothing-free      obstacles, but less free space than obstacles
 ///   images-contradict-poses  most pixels are inconsistent with the poses
+///   stamps-late, stamps-early  of the images, against the clock of the poses: what their rotations show
 ///   standing-still    the camera hardly moves between the frames of most pairs
 ///   poses-refused     frames without a pose
 ///   poses-too-short   motions too short for what the filter knows of them

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/closed_loop/passer_by.hpp"
 #include "pade/core/option_check.hpp"
 #include "pade/planning/local_window.hpp"
 #include "pade/planning/map_space.hpp"
@@ -78,6 +79,8 @@ class ChainLoop {
         maker_(task.scene, camera_, frame_options(options, task.seed)),
         watch_(task, options.planner.vehicle.radius) {}
 
+  /// Somebody will cross the way.
+  void await(PasserBy passer_by) { passer_by_ = std::move(passer_by); }
   Result<ChainRecord> run(const std::function<bool(const ChainMoment&)>& observer);
 
  private:
@@ -88,10 +91,12 @@ class ChainLoop {
   [[nodiscard]] cv::Mat picture(Time& stamp);
   void look(const cv::Mat& image, Time stamp);
   bool place(Time stamp, Pose& pose, Matrix6d& covariance);
+  void correct_stamps();
   void anchor(Time stamp);
   [[nodiscard]] MotionState start_of_plan(double effect) const;
   std::vector<MotionState> decide(double effect);
   bool fly_until(int tick);
+  void look_at_passer_by();
   void say(const std::string& what) { record_.events.push_back(fmt::format("{:.1f} s: {}", now(), what)); }
 
   const FlightTask& task_;
@@ -102,6 +107,8 @@ class ChainLoop {
   ObstacleMapper mapper_;
   std::shared_ptr<const mapping::MapView> view_;
   simulation::FrameMaker maker_;
+  std::optional<PasserBy> passer_by_;
+  bool touched_ = false;  // by it
   FlightWatch watch_;
   std::optional<planning::LocalPlanner> planner_;
   planning::LocalWindow window_;
@@ -115,6 +122,7 @@ class ChainLoop {
   std::optional<std::pair<Time, Pose>> last_;  // frame, as navigation has it
   Matrix6d since_taken_ = Matrix6d::Zero();    // of the motion to it from the last one that the mapper took
   std::string skipped_;                        // why the last one was
+  double stamp_correction_ = 0;                // s, of what the camera says
   Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
   double last_depth_ = 0;
   cv::Mat frozen_, image_;
@@ -165,6 +173,7 @@ cv::Mat ChainLoop::picture(Time& stamp) {
   if (fault.is_on(Fault::frozen_camera, now()) && !frozen_.empty()) return frozen_;
   const auto pose_at = [&](double offset) { return body_pose(moved(at, offset)) * T_body_camera_; };
   simulation::Rendering light = maker_.expose(pose_at(0), pose_at);
+  if (passer_by_) passer_by_->draw(light, pose_at(0), at.time.seconds() - take_off_);
   if (fault.kind == Fault::exposure_jump) {
     const bool bright = static_cast<int>(std::floor(now())) % 2 == 0;
     light.radiance *= bright ? 1.4 : 0.7;
@@ -200,6 +209,8 @@ void ChainLoop::anchor(Time stamp) {
 
 void ChainLoop::look(const cv::Mat& image, Time stamp) {
   ChainFrame& out = record_.frames.back();
+  stamp.nanoseconds += std::llround(stamp_correction_ * 1e9);
+  stamp = std::min(stamp, vehicle_.truth().time);  // an image is not from the future
   Pose pose;
   Matrix6d covariance;
   if (!place(stamp, pose, covariance)) {
@@ -231,6 +242,21 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
   out.views = update.views;
   out.refined = update.refinement.outcome == depth::RefinementOutcome::refined;
   view_ = view_->after(mapper_.map(), update.change);
+  correct_stamps();
+}
+
+/// Images and poses tell different times: from now on the camera's stamps are corrected, that of the last
+/// frame included.
+void ChainLoop::correct_stamps() {
+  const std::optional<StampOffset>& offset = mapper_.health().stamp_offset;
+  if (!offset || !offset->is_certain()) return;
+  stamp_correction_ += offset->seconds;
+  last_->first.nanoseconds += std::llround(offset->seconds * 1e9);
+  say(fmt::format(
+      "the images show that their stamps are {:.1f} ms {} ({:.1f} ms, 1 sigma): corrected by {:.1f} ms",
+      1e3 * std::abs(offset->seconds), offset->seconds < 0 ? "late" : "early", 1e3 * offset->sigma,
+      1e3 * stamp_correction_));
+  mapper_.forget_stamp_offset();
 }
 
 /// Where the vehicle will be when the plan that is made now takes effect.
@@ -272,6 +298,17 @@ std::vector<MotionState> ChainLoop::decide(double effect) {
   return plan.motion;
 }
 
+/// Whoever walks into a vehicle that stands is no mistake of the vehicle: it is said, and the flight goes on.
+void ChainLoop::look_at_passer_by() {
+  if (!passer_by_) return;
+  const double distance = passer_by_->distance(vehicle_.truth().position, now());
+  record_.passer_by_clearance = std::min(record_.passer_by_clearance.value_or(distance), distance);
+  if (distance >= options_.planner.vehicle.radius || touched_) return;
+  touched_ = true;
+  say(fmt::format("the passer-by touches the vehicle, which flies at {:.1f} m/s",
+                  vehicle_.truth().velocity.norm()));
+}
+
 /// False if it touches something or believes itself at the goal.
 bool ChainLoop::fly_until(int tick) {
   constexpr int kLookEvery = 2;  // steps: 100 Hz
@@ -283,6 +320,7 @@ bool ChainLoop::fly_until(int tick) {
                  T_map_smooth_, time);
     if (tick_ % kLookEvery != 0) continue;
     if (!watch_.look(level(vehicle_.truth(), now()))) return false;
+    look_at_passer_by();
     const Vector3d left = T_map_world_ * goal_ - vehicle_.believed().translation;
     if (left.head<2>().norm() < options_.planner.arrival) return false;
   }
@@ -314,6 +352,7 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
     record_.flight = watch_.finished(outcome, climbed_);
     record_.view = view_;
     record_.climbed = climbed_;
+    record_.stamp_correction = stamp_correction_;
     record_.mapper = std::make_shared<ObstacleMapper>(std::move(mapper_));
     for (const ChainFrame& f : record_.frames) record_.seconds_blind += f.blind ? 1 / options_.frame_rate : 0;
     return std::move(record_);
@@ -367,7 +406,14 @@ Result<ChainRecord> fly_chain(const FlightTask& task, const ChainFlightOptions& 
   auto mapper = ObstacleMapper::create(forward_camera(options.width), options.mapper);
   if (!mapper) return mapper.error();
   const Vector3d way = task.goal - task.start;
-  return ChainLoop(task, options, std::move(mapper).value(), std::atan2(way.y(), way.x())).run(observer);
+  ChainLoop loop(task, options, std::move(mapper).value(), std::atan2(way.y(), way.x()));
+  if (options.fault.kind == Fault::crossing) {
+    auto passer_by = PasserBy::create(task, forward_camera(options.width), frame_options(options, task.seed),
+                                      options.fault.crossing_ahead, options.fault.from);
+    if (!passer_by) return passer_by.error();
+    loop.await(std::move(passer_by).value());
+  }
+  return loop.run(observer);
 }
 
 }  // namespace pade::closed_loop

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -91,6 +92,8 @@ struct ChainRecord {
   Pose T_world_map;                              ///< at take-off
   double climbed = 0;                            ///< s, when it was at the height of the start
   double seconds_blind = 0;                      ///< s
+  std::optional<double> passer_by_clearance;     ///< least, of the centre, m; if somebody walks by
+  double stamp_correction = 0;  ///< s, at the end: what the images have shown of their stamps
 };
 
 /// Flies from start to goal, from a standstill below the start with the nose toward the goal, by its own

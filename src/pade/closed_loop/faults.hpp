@@ -5,7 +5,11 @@
 #include <string_view>
 #include <utility>
 
+#include <Eigen/Core>
+
 #include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
+#include "pade/simulation/generator/open_world_scene.hpp"
 
 namespace pade::closed_loop {
 
@@ -22,6 +26,9 @@ enum class Fault {
   dropped_frames,  ///< one frame in ten never arrives
   compass_error,   ///< the magnetometer is turned about the vertical
   motion_blur,     ///< exposure of 10 ms
+  crossing,        ///< somebody walks across the way, close ahead
+  blank_wall,      ///< a wall without texture stands across the way
+  low_sun,         ///< the sun stands ten degrees high, straight ahead
 };
 
 struct FaultOptions {
@@ -31,6 +38,7 @@ struct FaultOptions {
   double stamp_error = 0.03;      ///< s
   double gust = 5;                ///< m/s
   double compass_error = 0.5236;  ///< rad
+  double crossing_ahead = 9;      ///< m
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -40,12 +48,18 @@ struct FaultOptions {
     field("stamp_error", self.stamp_error, "s between a stamp and its image");
     field("gust", self.gust, "wind of a gust, m/s");
     field("compass_error", self.compass_error, "turn of the magnetometer about the vertical, rad");
+    field("crossing_ahead", self.crossing_ahead,
+          "how far along the way somebody crosses it, `from` seconds after take-off, m");
   }
   /// Whether it goes on at this time of a flight (s).
   [[nodiscard]] bool is_on(Fault what, double time) const {
     return kind == what && time >= from && time < from + duration;
   }
 };
+
+/// What stands in a world, or lights it, for a fault; the world as it is for the others.
+/// Refuses a world in which a blank wall leaves no way for a ball of 0.5 m.
+Result<simulation::OpenWorldScene> built_for(Fault fault, simulation::OpenWorldScene world);
 
 }  // namespace pade::closed_loop
 
@@ -61,5 +75,8 @@ struct pade::EnumNames<pade::closed_loop::Fault> {
                                        std::pair{F::exposure_jump, std::string_view("exposure-jump")},
                                        std::pair{F::dropped_frames, std::string_view("dropped-frames")},
                                        std::pair{F::compass_error, std::string_view("compass-error")},
-                                       std::pair{F::motion_blur, std::string_view("motion-blur")}};
+                                       std::pair{F::motion_blur, std::string_view("motion-blur")},
+                                       std::pair{F::crossing, std::string_view("crossing")},
+                                       std::pair{F::blank_wall, std::string_view("blank-wall")},
+                                       std::pair{F::low_sun, std::string_view("low-sun")}};
 };

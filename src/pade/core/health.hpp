@@ -64,11 +64,28 @@ struct NavigationHealth {
   std::vector<navigation::SensorSummary> sensors;  ///< those that the log has
 };
 
+/// Time between the stamps of the images and those of the poses, as the images tell it.
+struct StampOffset {
+  double seconds = 0;     ///< what the images' stamps want added to them; negative: they are late
+  double sigma = 0;       ///< standard deviation of it, s
+  std::size_t pairs = 0;  ///< of frames, of which it was found
+
+  /// No chance, and large enough to matter: more than four sigmas, and than 4 ms.
+  [[nodiscard]] bool is_certain() const {
+    constexpr double kMatters = 0.004;  // s
+    const double size = seconds < 0 ? -seconds : seconds;
+    return size > kMatters && size > 4 * sigma;
+  }
+};
+
 /// Counts of a flight so far.
 struct MapperHealth {
   std::size_t frames = 0;   ///< calls of add()
   std::size_t mapped = 0;   ///< of them, those that gave a depth image
   std::size_t skipped = 0;  ///< of them, those that could not be used
+  /// Of the last half minute of turns; empty if the camera has not turned unevenly enough to tell 10 ms, or
+  /// the poses are said to be exact.
+  std::optional<StampOffset> stamp_offset;
 };
 
 }  // namespace pade

@@ -188,6 +188,7 @@ class Run {
     info.local_origin = sequence_.local_origin();
     info.map = tally_.map_summary(mapper_.map());
     info.motion = tally_.motion_summary();
+    info.motion.stamp_offset = mapper_.health().stamp_offset;
     info.masked_share = masked_share(sequence_.mask());
     return info;
   }

@@ -94,6 +94,7 @@ bool many_views(const ObstacleMapperOptions& o) {
 
 constexpr double kScaleDrift = 1e-5;  // variance of the logarithm, from frame to frame
 constexpr double kLengthGate = 16;    // four sigmas
+constexpr double kUnsureTurn = 0.02;  // rad
 
 /// The pose has moved, the image is the same.
 bool hangs(const TrackedFrame& newest, const TrackedFrame& last) {
@@ -210,6 +211,11 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
   return update_;
 }
 
+void ObstacleMapper::forget_stamp_offset() {
+  clock_.clear();
+  health_.stamp_offset.reset();
+}
+
 /// What only starts others need not be as good, unless somebody asks for it by name.
 flow::FlowEstimator& ObstacleMapper::flow_of_the_first_pair() {
   const bool starts = two_baselines(options_);
@@ -236,7 +242,7 @@ void ObstacleMapper::map_frame(TrackedFrame& newest) {
   }
   Pair pair = match(reference, newest_is_reference ? older.frame : newest.frame, prior,
                     flow_of_the_first_pair(), foretold);
-  refine(pair, reference);
+  refine(pair, newest, reference);
   if (many_views(options_)) refine_by_depth(prior, pair, newest.frame);
   place(newest, older);
 
@@ -292,16 +298,39 @@ ObstacleMapper::Pair ObstacleMapper::match(const Frame& reference, const Frame& 
   return pair;
 }
 
-void ObstacleMapper::refine(Pair& pair, const Frame& reference) {
-  const Stopwatch watch(update_, Stage::refine);
-  const bool image = options_.derotation == depth::Derotation::image;
+depth::RefinedMotion ObstacleMapper::refined(const Pair& pair, const RelativeMotion& prior,
+                                             const Eigen::Matrix3d& removed, const Frame& reference) {
   cv::Mat unseen;
   if (!valid_.empty()) unseen = valid_ == 0;
-  update_.refinement =
-      refiner_.refine({camera_, pair.motion, pair.flow,
-                       image ? pair.motion.R_reference_other : Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
-                       reference.image, unseen});
+  return refiner_.refine({camera_, prior, pair.flow, removed, reference.image, unseen});
+}
+
+void ObstacleMapper::refine(Pair& pair, const TrackedFrame& newest, const Frame& reference) {
+  const Stopwatch watch(update_, Stage::refine);
+  const RelativeMotion prior = pair.motion;
+  const bool image = options_.derotation == depth::Derotation::image;
+  const Eigen::Matrix3d removed =
+      image ? prior.R_reference_other : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  update_.refinement = refined(pair, prior, removed, reference);
   pair.motion = update_.refinement.motion;
+  using depth::RefinementOutcome;
+  const bool asked = options_.order == Order::newest && options_.step == 1 &&
+                     update_.refinement.outcome != RefinementOutcome::off &&
+                     update_.refinement.outcome != RefinementOutcome::exact_prior;
+  if (!asked) return;
+  // What poses and images disagree about must not be held to be right: the prior of the rotation is loose
+  // here.
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d gain = Eigen::Matrix3d::Zero();
+  if (clock_.is_telling(newest.frame.time, newest.given)) {
+    RelativeMotion loose = prior;
+    loose.covariance.bottomRightCorner<3, 3>() += kUnsureTurn * kUnsureTurn * Eigen::Matrix3d::Identity();
+    const depth::RefinedMotion seen = refined(pair, loose, removed, reference);
+    turn = seen.turn;
+    gain = seen.turn_gain;
+  }
+  clock_.add(newest.frame.time, newest.given, turn, gain);
+  health_.stamp_offset = clock_.found();
 }
 
 /// Aligns the newest frame with the depth of the last one.

@@ -26,6 +26,7 @@
 #include "pade/depth/motion/baseline_window.hpp"
 #include "pade/depth/motion/motion_alignment.hpp"
 #include "pade/depth/motion/motion_refinement.hpp"
+#include "pade/depth/motion/stamp_clock.hpp"
 #include "pade/depth/multi_view/views_depth.hpp"
 #include "pade/flow/epipolar/multi_view.hpp"
 #include "pade/flow/flow_estimator.hpp"
@@ -169,6 +170,10 @@ class ObstacleMapper {
   const MapperUpdate& add(const cv::Mat& image, Time time, const Pose& T_world_camera,
                           const Matrix6d& motion_covariance = Matrix6d::Zero());
 
+  /// The stamps of the images are corrected by health().stamp_offset from the next frame on: it is looked for
+  /// anew.
+  void forget_stamp_offset();
+
   /// Pose of the newest frame that was taken, in the map's world: as given, corrected by the images.
   [[nodiscard]] const Pose& T_world_camera() const { return recent_.last().frame.T_world_camera; }
 
@@ -193,7 +198,9 @@ class ObstacleMapper {
   [[nodiscard]] cv::Mat foretold_flow(const RelativeMotion& motion) const;
   Pair match(const Frame& reference, const Frame& other, const RelativeMotion& motion,
              flow::FlowEstimator& method, const cv::Mat& initial);
-  void refine(Pair& pair, const Frame& reference);
+  depth::RefinedMotion refined(const Pair& pair, const RelativeMotion& prior, const Eigen::Matrix3d& removed,
+                               const Frame& reference);
+  void refine(Pair& pair, const TrackedFrame& newest, const Frame& reference);
   depth::AlignedMotion align(const Pair& pair, const Frame& newest);
   void refine_by_depth(const RelativeMotion& given, Pair& pair, const Frame& newest);
   void place(TrackedFrame& newest, const TrackedFrame& older) const;
@@ -212,6 +219,7 @@ class ObstacleMapper {
   depth::MotionRefiner refiner_;
   depth::MotionAligner aligner_;
   depth::BaselineWindow baselines_;
+  depth::StampClock clock_;
   std::vector<int> seen_from_;  // views of the last depth image, in frames before it
   depth::DepthEstimator depth_;
   flow::MultiViewEstimator views_;

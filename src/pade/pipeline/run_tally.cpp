@@ -69,7 +69,8 @@ io::MapSummary RunTally::map_summary(const mapping::OccupancyMap& map) const {
 
 io::MotionSummary RunTally::motion_summary() const {
   const auto middle = [](std::vector<double> values) { return median(values, 0.0); };
-  return {baselines_.size(), still_, middle(baselines_), middle(rotation_sigmas_), middle(direction_sigmas_)};
+  return {baselines_.size(),         still_, middle(baselines_), middle(rotation_sigmas_),
+          middle(direction_sigmas_), {}};
 }
 
 }  // namespace pade

@@ -73,7 +73,7 @@ RunInfo some_info(cv::Size size) {
   info.world_up = WorldUp{{0, -1, 0}, true, "camera.yaml"};
   info.origin = GeographicOrigin{48.1, 11.6, 519.0};
   info.map = MapSummary{0.1, 123, 4567, 9000, 800, 70, 6, 5000};
-  info.motion = {3, 1, 0.25, 0.125, 1.5};
+  info.motion = {3, 1, 0.25, 0.125, 1.5, StampOffset{-0.03, 0.001, 25}};
   info.masked_share = 0.0625;
   info.hints = {{"empty-map", HintSeverity::error, "the map is \"empty\"", "fly nearer"},
                 {"large-mask", HintSeverity::warning, "61 % is masked", "check mask.png"}};
@@ -224,6 +224,10 @@ TEST(RunFolderFiles, KeepTheHintsAndWhatTheyLookAt) {
   EXPECT_EQ(info.motion.baseline, 0.25);
   EXPECT_EQ(info.motion.rotation_sigma, 0.125);
   EXPECT_EQ(info.motion.direction_sigma, 1.5);
+  ASSERT_TRUE(info.motion.stamp_offset);
+  EXPECT_EQ(info.motion.stamp_offset->seconds, -0.03);
+  EXPECT_EQ(info.motion.stamp_offset->sigma, 0.001);
+  EXPECT_EQ(info.motion.stamp_offset->pairs, 25U);
   EXPECT_EQ(info.masked_share, 0.0625);
 }
 

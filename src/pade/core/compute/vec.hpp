@@ -83,6 +83,35 @@ PADE_INLINE V gather(const float* base, I index) {
 }
 #endif
 
+// first[i] = base[index[i]], second[i] = base[index[i] + 1]: half the fetches of two gathers.
+PADE_INLINE void gather_pairs(const float* base, I index, V& first, V& second) {
+#if defined(__AVX512F__)
+  const auto fetch = [&](__m256i at) {
+    return V(_mm512_mask_i32gather_pd(__m512d{}, __mmask8{0xff}, at, base, 4));
+  };
+  const auto low = fetch(__m256i(__builtin_shufflevector(index, index, 0, 1, 2, 3, 4, 5, 6, 7)));
+  const auto high = fetch(__m256i(__builtin_shufflevector(index, index, 8, 9, 10, 11, 12, 13, 14, 15)));
+  first = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+  second = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+#elif defined(__AVX2__)
+  const auto* pairs = reinterpret_cast<const double*>(base);
+  // Ordered so that shuffles within halves put the lanes right.
+  const I order = __builtin_shufflevector(index, index, 0, 1, 4, 5, 2, 3, 6, 7);
+  // The plain intrinsic starts from an uninitialised operand, which GCC 12's own warnings refuse.
+  const auto fetch = [&](__m128i at) {
+    const __m256d every = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
+    return V(_mm256_mask_i32gather_pd(_mm256_setzero_pd(), pairs, at, every, 4));
+  };
+  const V low = fetch(_mm256_castsi256_si128(__m256i(order)));
+  const V high = fetch(_mm256_extracti128_si256(__m256i(order), 1));
+  first = V(_mm256_shuffle_ps(__m256(low), __m256(high), 0x88));
+  second = V(_mm256_shuffle_ps(__m256(low), __m256(high), 0xdd));
+#else
+  first = gather(base, index);
+  second = gather(base + 1, index);
+#endif
+}
+
 PADE_INLINE I truncate(V a) { return __builtin_convertvector(a, I); }
 PADE_INLINE V to_float(I a) { return __builtin_convertvector(a, V); }
 PADE_INLINE V abs(V a) { return V(I(a) & 0x7fffffff); }

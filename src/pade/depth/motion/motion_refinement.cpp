@@ -210,6 +210,17 @@ Measurement measurement(const Sums& sums, const Matrix6d& floor, double inflatio
           correlation};
 }
 
+/// Of an error S e of the prior the solution shows S (I - posterior) e.
+Eigen::Matrix3d turn_gain(const Matrix6d& root, const Matrix6d& posterior) {
+  if (!(root.diagonal().minCoeff() > 0)) return Eigen::Matrix3d::Zero();  // partly exact
+  const Matrix6d shown = root * (Matrix6d::Identity() - posterior);
+  return root.transpose()
+      .triangularView<Eigen::Upper>()
+      .solve(shown.transpose())
+      .transpose()
+      .bottomRightCorner<3, 3>();
+}
+
 RefinedMotion unchanged(const RelativeMotion& prior, RefinementOutcome outcome, RefinedMotion so_far = {}) {
   so_far.motion = prior;
   so_far.outcome = outcome;
@@ -393,6 +404,8 @@ RefinedMotion MotionRefiner::refine(const RefinementInput& input) {
 
   const Matrix6d posterior = inverse(flow.information + identity);
   out.surprise = z.squaredNorm();
+  out.turn = (root * z).tail<3>();
+  out.turn_gain = turn_gain(root, posterior);
   if (out.surprise > kLargestSurprise || out.inlier_share < kLeastInlierShare) {
     return unchanged(prior, RefinementOutcome::inconsistent, out);
   }

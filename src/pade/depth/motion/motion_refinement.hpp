@@ -69,6 +69,12 @@ struct RefinedMotion {
   double length_sigma_relative = 0;  ///< standard deviation of |t| over |t|; infinite if t = 0
   double direction_sigma = 0;        ///< largest standard deviation of the direction of t, rad
   bool direction_valid = false;      ///< direction_sigma is less than 0.1 rad (6 degrees)
+  /// Rotation that the images ask for, rad: R_reference_other = exp(turn) R of the prior. Also if they
+  /// contradict the prior (`inconsistent`); zero if nothing was solved for.
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  /// What `turn` shows of a true error of the prior's rotation: the identity where the images know all of it,
+  /// zero where the prior alone speaks.
+  Eigen::Matrix3d turn_gain = Eigen::Matrix3d::Zero();
 };
 
 /// What a pair of frames gives to the refinement.

@@ -26,10 +26,12 @@ struct Bilinear {
     const V ax = safe_x - to_float(ix);
     const V ay = safe_y - to_float(iy);
     const I index = iy * stride + ix;
-    const V a = gather(values, index);
-    const V b = gather(values + 1, index);
-    const V c = gather(values + stride, index);
-    const V d = gather(values + stride + 1, index);
+    V a;
+    V b;
+    V c;
+    V d;
+    gather_pairs(values, index, a, b);
+    gather_pairs(values + stride, index, c, d);
     const V above = a + ax * (b - a);
     const V below = c + ax * (d - c);
     return select(inside, above + ay * (below - above), set(__builtin_nanf("")));
@@ -57,8 +59,9 @@ struct Bilinear {
                                       const float* depth, const float* flow) {
   const I two = 2 * truncate(ramp());
   const V x = ramp() + static_cast<float>(from);
-  const V wx = gather(flow + 2L * from, two);
-  const V wy = gather(flow + 2L * from + 1, two);
+  V wx;
+  V wy;
+  gather_pairs(flow + 2L * from, two, wx, wy);
   const V ax = (x - p.cx) * p.tz - p.fx_tx;
   const V ay = set((static_cast<float>(y) - p.cy) * p.tz - p.fy_ty);
   const V ad = ax * wx + ay * wy;

@@ -10,6 +10,7 @@ using simd::PADE_ISA::abs;
 using simd::PADE_ISA::all;
 using simd::PADE_ISA::clamp;
 using simd::PADE_ISA::gather;
+using simd::PADE_ISA::gather_pairs;
 using simd::PADE_ISA::I;
 using simd::PADE_ISA::kLanes;
 using simd::PADE_ISA::load;
@@ -44,6 +45,24 @@ PADE_INLINE void fetch(const float* const (&planes)[kCount], I at, V (&out)[kCou
   }
 }
 
+// The same for a pixel, its right neighbour, and both below.
+PADE_INLINE void fetch_corners(const float* plane, int stride, I at, V (&out)[4]) {
+  const I start = at - truncate(ramp());
+  const I like_first = start == start[0];
+  const int from_first = start[0];
+  const int from_last = start[kLanes - 1];
+  const float* const corners[4] = {plane, plane + 1, plane + stride, plane + stride + 1};
+  if (all(like_first)) {
+    for (int i = 0; i < 4; ++i) out[i] = load(corners[i] + from_first);
+  } else if (from_last >= 0 && all(like_first | (start == from_last))) {
+    for (int i = 0; i < 4; ++i)
+      out[i] = select(like_first, load(corners[i] + from_first), load(corners[i] + from_last));
+  } else {
+    gather_pairs(plane, at, out[0], out[1]);
+    gather_pairs(plane + stride, at, out[2], out[3]);
+  }
+}
+
 // The bilinear value of a plane at (x, y), which must lie in [0, width - 1] x [0, height - 1]. Rows have a
 // spare element behind their end and planes a spare row, so that the far corner needs no test.
 PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
@@ -52,9 +71,8 @@ PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
   const V ax = x - to_float(ix);
   const V ay = y - to_float(iy);
   const I at = iy * stride + ix;
-  const float* const corners[4] = {plane, plane + 1, plane + stride, plane + stride + 1};
   V v[4];
-  fetch(corners, at, v);
+  fetch_corners(plane, stride, at, v);
   const V top = v[0] + ax * (v[1] - v[0]);
   const V bottom = v[2] + ax * (v[3] - v[2]);
   return top + ay * (bottom - top);

@@ -47,6 +47,11 @@ constexpr auto motion_fields = [](auto& motion, auto&& field) {
   field("rotation_sigma_deg", motion.rotation_sigma, "degrees");
   field("direction_sigma_deg", motion.direction_sigma, "degrees");
 };
+constexpr auto offset_fields = [](auto& offset, auto&& field) {
+  field("seconds", offset.seconds, "seconds");
+  field("sigma_s", offset.sigma, "seconds");
+  field("pairs", offset.pairs, "a count");
+};
 constexpr auto hint_fields = [](auto& hint, auto&& field) {
   field("id", hint.id, "a name");
   field("severity", hint.severity, "warning or error");
@@ -101,6 +106,9 @@ void read_optional_parts(Fields& fields, RunInfo& info) {
     up.read("source", info.world_up->source, "text");
     if (direction.size() == 3)
       info.world_up->direction = Eigen::Vector3d(direction[0], direction[1], direction[2]);
+  }
+  if (fields.has("stamp_offset")) {  // absent in runs of earlier versions
+    fields.object("stamp_offset").read_all(offset_fields, info.motion.stamp_offset.emplace());
   }
   if (fields.has("geographic_origin")) {
     fields.object("geographic_origin").read_all(origin_fields, info.origin.emplace());
@@ -180,6 +188,7 @@ std::string to_json(const RunInfo& info) {
                {"local_origin_m", {info.local_origin.x(), info.local_origin.y(), info.local_origin.z()}},
                {"map", nullptr},
                {"motion", json_by(motion_fields, info.motion)},
+               {"stamp_offset", nullptr},
                {"masked_share", info.masked_share},
                {"hints", list_by(hint_fields, info.hints)},
                {"stacks", info.stacks},
@@ -194,6 +203,7 @@ std::string to_json(const RunInfo& info) {
                         {"source", info.world_up->source}};
   }
   if (info.origin) json["geographic_origin"] = json_by(origin_fields, *info.origin);
+  if (info.motion.stamp_offset) json["stamp_offset"] = json_by(offset_fields, *info.motion.stamp_offset);
   if (info.map) json["map"] = json_by(map_fields, *info.map);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -39,6 +39,8 @@ struct MotionSummary {
   double baseline = 0;            ///< median distance between the two cameras, metres
   double rotation_sigma = 0;      ///< median, per axis, degrees; 0 = said to be exact
   double direction_sigma = 0;     ///< of the translation, median, per axis, degrees; 0 = said to be exact
+  /// What the images say of their stamps, if they say anything (MapperHealth::stamp_offset).
+  std::optional<StampOffset> stamp_offset;
 };
 
 /// run.json.

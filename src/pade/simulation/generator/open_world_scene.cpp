@@ -25,9 +25,14 @@ class PassageSearch {
   PassageSearch(const SurfaceDistance& surface, const Vector3d& start, const Vector3d& goal,
                 const PassageOptions& options)
       : surface_(surface), reach_(options.radius + 0.5 * kStep), start_(start) {
-    const Vector3d low(-options.beyond, -options.half_width, options.lowest - start.z());
-    const Vector3d high(goal.x() - start.x() + options.beyond, options.half_width,
-                        options.highest - start.z());
+    const Vector3d way = goal - start;
+    const bool along_x = std::abs(way.x()) >= std::abs(way.y());
+    const Vector3d room = along_x ? Vector3d(options.beyond, options.half_width, 0)
+                                  : Vector3d(options.half_width, options.beyond, 0);
+    Vector3d low = way.cwiseMin(0) - room;
+    Vector3d high = way.cwiseMax(0) + room;
+    low.z() = options.lowest - start.z();
+    high.z() = options.highest - start.z();
     first_ = (low / kStep).array().ceil().cast<int>();
     size_ = Vector3i((high / kStep).array().floor().cast<int>()) - first_ + Vector3i::Ones();
     end_ = ((goal - start) / kStep).array().round().cast<int>();

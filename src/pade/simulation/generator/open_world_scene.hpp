@@ -16,7 +16,7 @@ struct PassageOptions {
   double radius = 0.5;     ///< of the ball, m
   double lowest = 0.7;     ///< its centre's least height, m
   double highest = 2.8;    ///< and the greatest, m
-  double half_width = 22;  ///< to each side of the line from start to goal (along x), m
+  double half_width = 22;  ///< to each side of start and goal, across the axis that the way rather follows, m
   double beyond = 4;       ///< behind start and goal, m
 };
 

@@ -1,0 +1,246 @@
+#include "grid.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pade/evaluation/binomial.hpp"
+#include "pade/io/atomic_output.hpp"
+#include "pade/io/text.hpp"
+#include "pade/pipeline/depth_from.hpp"
+
+#include "../progress.hpp"
+#include "fleet.hpp"
+#include "flight_files.hpp"
+
+namespace pade::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using closed_loop::Fault;
+using nlohmann::ordered_json;
+using simulation::OpenWorldKind;
+
+constexpr std::uint64_t kFirstSeed = 101;  // nothing was tuned on this or any later one
+constexpr double kFaultWay = 25;           // m
+constexpr double kQuickWay = 20;           // m
+constexpr int kWorlds = 3;
+constexpr std::array kKinds = {OpenWorldKind::forest, OpenWorldKind::rubble, OpenWorldKind::building_site};
+using Seeds = std::array<int, kWorlds>;  // how many in each world
+constexpr Seeds kMany = {40, 30, 30};
+constexpr Seeds kFew = {8, 6, 6};
+constexpr Seeds kForests = {20, 0, 0};
+constexpr Seeds kQuick = {2, 2, 2};
+
+/// One row of the table per world that it has flights in.
+struct Configuration {
+  std::string name;
+  Seeds seeds;
+  double density = 400;
+  std::optional<double> way;
+};
+
+std::vector<Configuration> all_configurations() {
+  std::vector<Configuration> all = {{"chain", kMany, 400, {}},
+                                    {"exact", kMany, 400, {}},
+                                    {"straight", kMany, 400, {}},
+                                    {"density-200", kForests, 200, {}},
+                                    {"density-800", kForests, 800, {}}};
+  for (const char* name : {"unknown-is-free", "no-peering", "no-refinement", "two-view", "pade", "ttc"})
+    all.push_back({name, kFew, 400, {}});
+  for (const auto& [fault, name] : EnumNames<Fault>::names) {
+    if (fault != Fault::none) all.push_back({std::string(name), kFew, 400, kFaultWay});
+  }
+  return all;
+}
+
+void set_flier(const std::string& name, FleetOptions& options) {
+  if (name == "exact") options.flier = Flier::exact;
+  if (name == "straight") options.flier = Flier::straight;
+  if (name == "unknown-is-free") options.chain.planner.unknown_is_free = true;
+  if (name == "no-peering") options.chain.planner.peering = false;
+  if (name == "no-refinement") options.chain.mapper.refinement.on = options.chain.mapper.alignment.on = false;
+  if (const auto from = from_name<DepthFrom>(name)) choose_depth(*from, options.chain.mapper);
+  if (const auto fault = from_name<Fault>(name)) options.chain.fault.kind = *fault;
+  options.exact.planner = options.chain.planner;
+}
+
+/// The flights of one configuration in one kind of world.
+struct Cell {
+  const Configuration* configuration = nullptr;
+  FleetOptions fleet;
+};
+
+std::vector<Cell> cells_of(const std::vector<Configuration>& configurations, const GridOptions& options) {
+  std::vector<Cell> cells;
+  for (const Configuration& configuration : configurations) {
+    for (std::size_t i = 0; i < kKinds.size(); ++i) {
+      Cell cell{&configuration, {}};
+      FleetOptions& fleet = cell.fleet;
+      fleet.place.random = kKinds[i];
+      fleet.place.name = to_name(kKinds[i]);
+      fleet.place.density = configuration.density;
+      fleet.place.way = options.quick ? std::optional(kQuickWay) : configuration.way;
+      const int flights = options.quick ? kQuick[i] : configuration.seeds[i];
+      for (int k = 0; k < flights; ++k) fleet.seeds.push_back(kFirstSeed + static_cast<std::uint64_t>(k));
+      fleet.out = options.out / configuration.name / fleet.place.name;
+      fleet.threads = options.threads;
+      fleet.force = options.force;
+      set_flier(configuration.name, fleet);
+      if (flights > 0) cells.push_back(std::move(cell));
+    }
+  }
+  return cells;
+}
+
+/// Every shards-th of all flights, whichever cell it is of.
+void take_share(const GridOptions& options, std::vector<Cell>& cells) {
+  int number = 0;
+  for (Cell& cell : cells) {
+    std::erase_if(cell.fleet.seeds,
+                  [&](std::uint64_t) { return number++ % options.shards != options.shard - 1; });
+  }
+}
+
+std::string share_text(const ordered_json& share) {
+  return fmt::format("{} ({:.0f}-{:.0f} %)", share["flights"].get<std::size_t>(),
+                     std::floor(100 * share["low"].get<double>()),
+                     std::ceil(100 * share["high"].get<double>()));
+}
+
+double mean(const std::vector<ordered_json>& flown, const char* measure) {
+  double sum = 0;
+  for (const ordered_json& f : flown) sum += f.value(measure, 0.0);
+  return sum / static_cast<double>(flown.size());
+}
+
+ordered_json row_of(const std::string& configuration, const std::string& world, double density,
+                    const std::vector<ordered_json>& flown) {
+  const ordered_json totals = totals_of(flown);
+  double clearance = flown.front()["least_clearance_m"];
+  for (const ordered_json& f : flown) clearance = std::min(clearance, f["least_clearance_m"].get<double>());
+  return {{"configuration", configuration},
+          {"world", world},
+          {"density_per_ha", density},
+          {"totals", totals},
+          {"least_clearance_m", clearance},
+          {"path_excess", mean(flown, "path_excess")},
+          {"stops", mean(flown, "stops")},
+          {"seconds_blind", mean(flown, "seconds_blind")},
+          {"traversability", mean(flown, "traversability")}};
+}
+
+std::string table_of(const ordered_json& rows) {
+  std::string text =
+      "| configuration | world | flights | arrived (95 %) | collided (95 %) | stopped | astray | goal "
+      "velocity, m/s | least "
+      "clearance, m | path excess | stops | blind, s | traversability | straight way free |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const ordered_json& row : rows) {
+    const ordered_json& t = row["totals"];
+    text += fmt::format(
+        "| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.1f} | {:.1f} | {} |\n",
+        row["configuration"].get<std::string>(), row["world"].get<std::string>(),
+        t["flights"].get<std::size_t>(), share_text(t["arrived"]), share_text(t["collided"]),
+        t["timed out"].get<std::size_t>(), t["astray"].get<std::size_t>(),
+        t["mean_goal_velocity_m_s"].get<double>(), row["least_clearance_m"].get<double>(),
+        row["path_excess"].get<double>(), row["stops"].get<double>(), row["seconds_blind"].get<double>(),
+        row["traversability"].get<double>(), t["straight_way_is_free"]["flights"].get<std::size_t>());
+  }
+  return text;
+}
+
+Status write_cell(const fs::path& folder, const Fleet& fleet) {
+  const ordered_json all = summary_of(fleet);
+  if (const Status s = io::write_file(folder / "flights.json", all.dump(2) + "\n", io::Overwrite::replace);
+      !s)
+    return s;
+  return io::write_file(folder / "report.html", fleet_page(all), io::Overwrite::replace);
+}
+
+Result<std::vector<Configuration>> chosen(const GridOptions& options) {
+  const std::vector<Configuration> all = all_configurations();
+  std::vector<std::string> names = options.configurations;
+  if (names.empty())
+    names = options.quick ? std::vector<std::string>{"chain"}
+                          : std::vector<std::string>{"chain", "exact", "straight"};
+  if (names == std::vector<std::string>{"all"}) names = grid_configurations();
+  std::vector<Configuration> out;
+  for (const std::string& name : names) {
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const Configuration& c) { return c.name == name; });
+    if (found == all.end())
+      return Error{fmt::format("fly: found '{}', expected all or some of {}", name,
+                               fmt::join(grid_configurations(), ", "))};
+    out.push_back(*found);
+  }
+  return out;
+}
+
+Status fly_cells(std::vector<Cell>& cells, std::deque<Fleet>& fleets) {
+  std::size_t flights = 0;
+  for (const Cell& cell : cells) flights += cell.fleet.seeds.size();
+  Progress line("Flying", flights);
+  std::size_t before = 0;
+  for (Cell& cell : cells) {
+    const std::string name = fmt::format("{}, {}: ", cell.configuration->name, cell.fleet.place.name);
+    const std::size_t here = cell.fleet.seeds.size();
+    Fleet& fleet = fleets.emplace_back(std::move(cell.fleet));
+    const Status s =
+        fleet.fly([&](std::size_t done, const std::string& note) { line.show(before + done, name + note); });
+    if (!s) return s;
+    if (io::interrupted()) return Error{"interrupted; the flights that are finished are kept"};
+    before += here;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> grid_configurations() {
+  std::vector<std::string> names;
+  for (const Configuration& c : all_configurations()) names.push_back(c.name);
+  return names;
+}
+
+Status fly_grid(const GridOptions& options) {
+  const auto configurations = chosen(options);
+  if (!configurations) return configurations.error();
+  std::vector<Cell> cells = cells_of(*configurations, options);
+  if (options.shards > 1) take_share(options, cells);
+  std::vector<std::pair<const Configuration*, FleetOptions>> made;
+  for (const Cell& cell : cells) {
+    std::error_code failed;
+    fs::create_directories(cell.fleet.out, failed);
+    if (failed)
+      return Error{fmt::format("{}: cannot be made: {}", cell.fleet.out.string(), failed.message())};
+    made.emplace_back(cell.configuration, cell.fleet);
+  }
+  std::deque<Fleet> fleets;
+  if (const Status s = fly_cells(cells, fleets); !s) return s;
+  if (options.shards > 1) {
+    fmt::print("{}: shard {} of {} is done; without --shard the same command makes the table when all are\n",
+               options.out.string(), options.shard, options.shards);
+    return {};
+  }
+  ordered_json rows = ordered_json::array();
+  for (std::size_t i = 0; i < fleets.size(); ++i) {
+    const FleetOptions& fleet = made[i].second;
+    if (const Status s = write_cell(fleet.out, fleets[i]); !s) return s;
+    rows.push_back(row_of(made[i].first->name, fleet.place.name, fleet.place.density, fleets[i].flown()));
+  }
+  const std::string json = rows.dump(2) + "\n";
+  if (const Status s = io::write_file(options.out / "grid.json", json, io::Overwrite::replace); !s) return s;
+  const std::string table = table_of(rows);
+  if (const Status s = io::write_file(options.out / "grid.md", table, io::Overwrite::replace); !s) return s;
+  fmt::print("{}", options.json ? json : table);
+  return {};
+}
+
+}  // namespace pade::cli

@@ -1,0 +1,71 @@
+#include "pade/closed_loop/faults.hpp"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace pade::closed_loop {
+namespace {
+
+using Eigen::Vector3d;
+using namespace simulation;
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// Along the ground from start to goal.
+Vector3d heading(const OpenWorldScene& world) {
+  const Vector3d way = world.goal - world.start;
+  return Vector3d(way.x(), way.y(), 0).normalized();
+}
+
+Result<OpenWorldScene> rebuilt(World world, const OpenWorldScene& as) {
+  auto scene = Scene::build(std::move(world));
+  if (!scene) return scene.error();
+  auto surface = SurfaceDistance::build(*scene);
+  if (!surface) return surface.error();
+  return OpenWorldScene{std::move(scene).value(), std::move(surface).value(), as.start, as.goal, as.attempt};
+}
+
+Result<OpenWorldScene> with_low_sun(const OpenWorldScene& as) {
+  constexpr double kHeight = 10 * kDegree;
+  World world = as.scene.world();
+  const Vector3d to_sun = std::cos(kHeight) * heading(as) + std::sin(kHeight) * Vector3d::UnitZ();
+  if (!world.sun) world.sun.emplace();
+  world.sun->direction = -to_sun;
+  world.sun->colour = Vector3d(0.8, 0.6, 0.4);  // what the long way through the air leaves
+  return rebuilt(std::move(world), as);
+}
+
+/// As far ahead as leaves a way around it.
+Result<OpenWorldScene> with_blank_wall(const OpenWorldScene& as) {
+  constexpr std::array kAhead = {12.0, 10.0, 14.0, 8.0, 16.0};  // m
+  const Vector3d along = heading(as);
+  for (const double ahead : kAhead) {
+    World world = as.scene.world();
+    Visual wall;
+    wall.name = "blank wall";
+    wall.shape = Box{{0.2, 6, 4}};
+    wall.material.colour = Vector3d::Constant(0.5);
+    const Vector3d foot = as.start + ahead * along;
+    wall.T_world_shape = {
+        Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(along.y(), along.x()), Vector3d::UnitZ())),
+        {foot.x(), foot.y(), 2}};
+    world.visuals.push_back(wall);
+    auto built = rebuilt(std::move(world), as);
+    if (!built) return built.error();
+    if (is_passable(built->surface, built->start, built->goal)) return built;
+  }
+  return Error{
+      "--fault blank-wall: found no way around a wall 6 m wide, 8 to 16 m ahead, expected one (another "
+      "seed)"};
+}
+
+}  // namespace
+
+Result<OpenWorldScene> built_for(Fault fault, OpenWorldScene world) {
+  if (fault == Fault::low_sun) return with_low_sun(world);
+  if (fault == Fault::blank_wall) return with_blank_wall(world);
+  return world;
+}
+
+}  // namespace pade::closed_loop
