@@ -120,6 +120,14 @@ TEST(MavlinkParser, AnUnknownMessageIsNoGap) {
   EXPECT_EQ(parser.counts().gaps, 0U);
 }
 
+TEST(MavlinkParser, ALengthThatTheMessageCannotHaveIsRefusedAtOnce) {
+  constexpr std::uint8_t kLength = 28;  // of ATTITUDE
+  EXPECT_EQ(look(StreamBytes{0xfe, kLength, 0, 1, 1, 30}).found, Found::incomplete);
+  EXPECT_EQ(look(StreamBytes{0xfe, kLength - 1, 0, 1, 1, 30}).found, Found::nothing);
+  EXPECT_EQ(look(StreamBytes{0xfd, kLength - 1, 0, 0, 0, 1, 1, 30, 0, 0}).found, Found::incomplete);
+  EXPECT_EQ(look(StreamBytes{0xfd, kLength + 1, 0, 0, 0, 1, 1, 30, 0, 0}).found, Found::nothing);
+}
+
 TEST(MavlinkParser, NoiseNeverHoldsItUp) {
   // After any bytes at all, at most the longest packet is waited for in vain.
   std::mt19937 random(3);
