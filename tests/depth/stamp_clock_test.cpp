@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -31,7 +33,8 @@ struct Flight {
   double nonsense = 0;  // share of pairs that say anything
   double seconds = 20;
   unsigned seed = 1;
-  bool even = false;  // turns at constant rate
+  bool even = false;       // turns at constant rate
+  bool gyroscope = false;  // tells the rates
 
   [[nodiscard]] depth::StampClock flown(int* told = nullptr) const {
     depth::StampClock clock;
@@ -47,8 +50,14 @@ struct Flight {
     for (int i = 0; i * period < seconds; ++i) {
       const Pose given = at(i * period);
       const Pose truth = at(i * period + offset);
+      std::optional<Vector3d> rate;
+      if (gyroscope) {
+        constexpr double kStep = 1e-3;
+        rate = rotation_log(at(i * period - kStep).rotation.conjugate() * at(i * period + kStep).rotation) /
+               (2 * kStep);
+      }
       Vector3d turn = Vector3d::Zero();
-      const bool telling = i > 0 && clock.is_telling(Time::from_seconds(i * period), given);
+      const bool telling = i > 0 && clock.is_telling(Time::from_seconds(i * period), given, rate);
       if (told != nullptr) *told += telling ? 1 : 0;
       if (telling) {
         const Eigen::Quaterniond R_given = given.rotation.conjugate() * last_given.rotation;
@@ -59,7 +68,7 @@ struct Flight {
           turn = 0.05 * Vector3d(uniform(random), uniform(random), uniform(random));
       }
       clock.add(
-          Time::from_seconds(i * period), given, turn,
+          Time::from_seconds(i * period), given, rate, turn,
           telling ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : Eigen::Matrix3d(Eigen::Matrix3d::Zero()));
       last_given = given;
       last_true = truth;
@@ -70,8 +79,10 @@ struct Flight {
 
 TEST(StampClock, FindsOffsetsOfEitherSign) {
   for (const double offset : {-0.05, -0.03, -0.008, 0.008, 0.03, 0.05}) {
-    for (const double period : {0.05, 0.1}) {
+    for (const auto& [period, gyroscope] :
+         {std::pair{0.05, false}, {0.1, false}, {0.1, true}, {0.15, true}}) {
       Flight flight;
+      flight.gyroscope = gyroscope;
       flight.offset = offset;
       flight.period = period;
       flight.noise = 2e-4;
@@ -135,9 +146,9 @@ TEST(StampClock, AGapIsNoPair) {
   flight.offset = 0.03;
   depth::StampClock clock = flight.flown();
   const auto before = clock.found();
-  clock.add(Time::from_seconds(100), pose_at(3), Vector3d(0.09, 0, 0), Eigen::Matrix3d::Identity());
-  clock.add(Time::from_seconds(100.1), pose_at(4), Vector3d(0.09, 0, 0), Eigen::Matrix3d::Identity());
-  clock.add(Time::from_seconds(100.2), pose_at(5), Vector3d(0.09, 0, 0), Eigen::Matrix3d::Identity());
+  clock.add(Time::from_seconds(100), pose_at(3), {}, Vector3d(0.09, 0, 0), Eigen::Matrix3d::Identity());
+  clock.add(Time::from_seconds(100.1), pose_at(4), {}, Vector3d(0.09, 0, 0), Eigen::Matrix3d::Identity());
+  clock.add(Time::from_seconds(100.2), pose_at(5), {}, Vector3d(0.09, 0, 0), Eigen::Matrix3d::Identity());
   ASSERT_TRUE(clock.found());
   EXPECT_EQ(clock.found()->pairs, before->pairs);
 }

@@ -91,6 +91,7 @@ class ChainLoop {
   [[nodiscard]] cv::Mat picture(Time& stamp);
   void look(const cv::Mat& image, Time stamp);
   bool place(Time stamp, Pose& pose, Matrix6d& covariance);
+  [[nodiscard]] std::optional<Vector3d> rate(Time stamp);
   void correct_stamps();
   void anchor(Time stamp);
   [[nodiscard]] MotionState start_of_plan(double effect) const;
@@ -198,6 +199,18 @@ bool ChainLoop::place(Time stamp, Pose& pose, Matrix6d& covariance) {
   return true;
 }
 
+/// Of turn, camera axes, rad/s, over the last gyroscope sample before the stamp.
+std::optional<Vector3d> ChainLoop::rate(Time stamp) {
+  Time before = stamp;
+  before.nanoseconds -= std::llround(NavigatedVehicle::step * 1e9);
+  const auto then = vehicle_.navigator().absolute_pose(before);
+  const auto now = vehicle_.navigator().absolute_pose(stamp);
+  if (then.answer != navigation::Answer::valid || now.answer != navigation::Answer::valid)
+    return std::nullopt;
+  const Vector3d turned = rotation_log(then.T_smooth_body.rotation.conjugate() * now.T_smooth_body.rotation);
+  return T_body_camera_.rotation.conjugate() * turned / NavigatedVehicle::step;
+}
+
 /// Where the filter's worlds lie in the map's, by the frame that the mapper has just placed.
 void ChainLoop::anchor(Time stamp) {
   const auto known = vehicle_.navigator().absolute_pose(stamp);
@@ -218,12 +231,13 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
     say("navigation has no pose for the frame");
     return;
   }
-  const MapperUpdate& update = mapper_.add(image, stamp, pose, covariance);
+  const MapperUpdate& update = mapper_.add(image, stamp, pose, covariance, rate(stamp));
   out.outcome = update.outcome;
   if (update.outcome == MapperUpdate::Outcome::skipped) {
     if (skipped_.empty() || skipped_ != update.reason) say("frame skipped: " + update.reason);
     skipped_ = update.reason;
-    last_ = {stamp, pose};  // the chain goes on
+    view_ = view_->after(mapper_.map(), update.change);  // free space may be forgotten
+    last_ = {stamp, pose};                               // the chain goes on
     since_taken_ = covariance;
     return;
   }
@@ -339,7 +353,11 @@ void ChainLoop::frame() {
   update_ = nullptr;
   record_.frames.push_back(frame);
   const double began = processor_seconds();
-  if (arrives) look(image_, stamp);
+  if (arrives) {
+    look(image_, stamp);
+  } else {
+    view_ = view_->after(mapper_.map(), mapper_.forget(stamp));
+  }
   const Eigen::Vector3d& truth = vehicle_.truth().position;
   record_.frames.back().believed =
       tick_ == 0 ? truth : (record_.T_world_map * vehicle_.believed()).translation;

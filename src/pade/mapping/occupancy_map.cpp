@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "pade/mapping/clearance.hpp"
 #include "pade/mapping/hit_finder.hpp"
 #include "pade/mapping/pending_hits.hpp"
+#include "pade/mapping/tiles/free_ages.hpp"
 #include "pade/mapping/tiles/free_search.hpp"
 #include "pade/mapping/tiles/octree.hpp"
 #include "pade/mapping/tiles/voxel_store.hpp"
@@ -21,7 +23,9 @@
 namespace pade::mapping {
 
 struct OccupancyMap::Scratch {
-  explicit Scratch(const MapOptions& options) : finder(options) {}
+  explicit Scratch(const MapOptions& options) : finder(options) {
+    if (options.forget_after > 0) ages.emplace(options.forget_after);
+  }
   HitFinder finder;
   std::vector<std::uint64_t> occupied;  // all voxels that were hit, whether or not they are believed
   std::vector<VoxelHit> hits;
@@ -32,6 +36,7 @@ struct OccupancyMap::Scratch {
   std::vector<Clearance> views;  // the last few from places at least the baseline apart
   std::size_t oldest = 0;        // of `views`
   PendingHits pending;
+  std::optional<FreeAges> ages;
   int view = 0;               // places at least the baseline apart, so far
   Eigen::Vector3d place;      // of the last of them
   bool is_new_place = false;  // this image is from the next one
@@ -79,6 +84,8 @@ Status check(const MapOptions& o) {
     return out_of_range("free_margin_sigmas", o.free_margin_sigmas, "at least 0");
   if (!(o.free_hole >= 0 && o.free_hole <= 1000)) return out_of_range("free_hole", o.free_hole, "0 to 1000");
   if (!(o.looks_baseline >= 0)) return out_of_range("looks_baseline", o.looks_baseline, "at least 0");
+  if (!(o.forget_after == 0 || (o.forget_after >= 0.01 && o.forget_after <= 1e6)))
+    return out_of_range("forget_after", o.forget_after, "0, or 0.01 to 1000000 s");
   if (!(o.hit_max_relative_sigma >= 0 && o.hit_max_relative_sigma <= 0.5)) {
     return out_of_range("hit_max_relative_sigma", o.hit_max_relative_sigma, "0 to 0.5");
   }
@@ -174,8 +181,8 @@ void OccupancyMap::find_free(MapChange& change) {
       s.witnesses.push_back(&view);
   }
   s.free.clear();
-  change.pending_free =
-      mapping::find_free(s.now, s.witnesses, options_.looks_baseline == 0, options_.voxel, *voxels_, s.free);
+  change.pending_free = mapping::find_free(s.now, s.witnesses, options_.looks_baseline == 0,
+                                           s.ages.has_value(), options_.voxel, *voxels_, s.free);
   cut_out(s.free, s.occupied, s.scratch);
 }
 
@@ -212,8 +219,18 @@ MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera,
   scratch_->finder.find(image, cells, T_world_camera, change);
   believe_hits(change);
   find_free(change);
+  if (scratch_->ages) {
+    scratch_->ages->forget(image.time, *voxels_, change);
+    scratch_->ages->see(scratch_->free);
+  }
   voxels_->apply(scratch_->free, scratch_->hits, change);
   remember_view();
+  return change;
+}
+
+MapChange OccupancyMap::forget(Time now) {
+  MapChange change;
+  if (scratch_->ages) scratch_->ages->forget(now, *voxels_, change);
   return change;
 }
 

@@ -39,6 +39,8 @@ struct MapOptions {
   double free_hole = 0.1;            ///< what is smaller is not looked for, m
   double looks_baseline = 0.1;  ///< between the places of the two looks that make a voxel free, and of those
                                 ///< that confirm a far or uncertain hit, m; 0 = one look is enough
+  double forget_after =
+      0;  ///< free voxels that are not seen free for so long are unknown again, s; 0 = never
   double hit_max_relative_sigma = 0.25;  ///< depths with sigma above this share of Z place no obstacle
   double hit_near = 8;                   ///< hits at this depth and beyond wait for a second look, m
   double hit_min_share = 0.05;           ///< of the pixels that a voxel covers in the image, to count as hit
@@ -59,6 +61,8 @@ struct MapOptions {
     field("looks_baseline", self.looks_baseline,
           "between two looks that make a voxel free or confirm a far or uncertain hit, m; 0 = one look is "
           "enough");
+    field("forget_after", self.forget_after,
+          "free voxels that are not seen free for so long are unknown again, s; 0 = never");
     field("hit_max_relative_sigma", self.hit_max_relative_sigma,
           "depths with sigma above this share of Z place no obstacle");
     field("hit_near", self.hit_near, "hits at this depth and beyond wait for a second look, m");
@@ -92,6 +96,7 @@ struct MapCell {
 struct MapChange {
   std::vector<MapCell> became_occupied;  ///< from unknown or from free
   std::vector<MapCell> became_free;      ///< from unknown or from occupied
+  std::vector<MapCell> became_unknown;   ///< from free, not seen for MapOptions::forget_after
   /// Cubes of 8 voxels to a side, or larger ones, in which an occupancy may have changed: what a MapView
   /// takes over.
   std::vector<MapCell> touched;
@@ -151,6 +156,12 @@ class OccupancyMap {
   /// @param camera          pinhole of the image at full size (its distortion is ignored)
   /// @param T_world_camera  metres; must be finite
   MapChange integrate(const DepthImage& image, const Camera& camera, const Pose& T_world_camera);
+
+  /// Time goes on without a depth image: with MapOptions::forget_after free voxels become unknown that were
+  /// last seen free longer ago, by a quarter of it at most; integrate() does the same. What came from a file,
+  /// or was seen before the option was set, stays.
+  /// @param now  not before the last image
+  MapChange forget(Time now);
 
   /// State of the voxel that holds a point (world, m). Beyond what the octree can address: unknown.
   [[nodiscard]] Occupancy at(const Eigen::Vector3d& point) const;

@@ -176,7 +176,8 @@ std::string ObstacleMapper::reason_to_skip(const cv::Mat& image, Time time, cons
 }
 
 const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const Pose& T_world_camera,
-                                        const Matrix6d& motion_covariance) {
+                                        const Matrix6d& motion_covariance,
+                                        const std::optional<Eigen::Vector3d>& rate) {
   ++health_.frames;
   update_.seconds = {};
   update_.aligned = false;
@@ -184,11 +185,13 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
   update_.reason = reason_to_skip(image, time, T_world_camera);
   if (!update_.reason.empty()) {
     update_.outcome = MapperUpdate::Outcome::skipped;
+    update_.change = {};
     ++health_.skipped;
     return update_;
   }
 
   TrackedFrame newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera};
+  newest.rate = rate;
   {
     const Stopwatch watch(update_, Stage::grey);
     newest.frame.image = to_grey(image);
@@ -196,6 +199,7 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
   if (!recent_.empty() && hangs(newest, recent_.last())) {
     update_.reason = "the camera has moved, but the image is that of before to the last bit: it hangs";
     update_.outcome = MapperUpdate::Outcome::skipped;
+    update_.change = map_.forget(time);
     ++health_.skipped;
     return update_;
   }
@@ -210,6 +214,8 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
   recent_.push(std::move(newest), kept);
   return update_;
 }
+
+mapping::MapChange ObstacleMapper::forget(Time now) { return map_.forget(now); }
 
 void ObstacleMapper::forget_stamp_offset() {
   clock_.clear();
@@ -322,14 +328,14 @@ void ObstacleMapper::refine(Pair& pair, const TrackedFrame& newest, const Frame&
   // here.
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();
   Eigen::Matrix3d gain = Eigen::Matrix3d::Zero();
-  if (clock_.is_telling(newest.frame.time, newest.given)) {
+  if (clock_.is_telling(newest.frame.time, newest.given, newest.rate)) {
     RelativeMotion loose = prior;
     loose.covariance.bottomRightCorner<3, 3>() += kUnsureTurn * kUnsureTurn * Eigen::Matrix3d::Identity();
     const depth::RefinedMotion seen = refined(pair, loose, removed, reference);
     turn = seen.turn;
     gain = seen.turn_gain;
   }
-  clock_.add(newest.frame.time, newest.given, turn, gain);
+  clock_.add(newest.frame.time, newest.given, newest.rate, turn, gain);
   health_.stamp_offset = clock_.found();
 }
 

@@ -144,7 +144,7 @@ struct MapperUpdate {
   depth::RefinedMotion refinement;      ///< of the motion over `step` of the options, and how it was found
   DepthImage depth;                     ///< of the reference: depth, variance, state, bound per pixel
   depth::DepthDiagnostics diagnostics;  ///< of the (last) pair
-  mapping::MapChange change;            ///< what the depth image changed in the map
+  mapping::MapChange change;  ///< what the depth image changed in the map; of a skipped frame: what it forgot
   std::array<double, stage_names.size()> seconds{};  ///< wall time per Stage
 };
 
@@ -167,8 +167,14 @@ class ObstacleMapper {
   /// @param motion_covariance  of the motion from the frame before (Frame::motion_covariance); zero = exact.
   /// If it is not zero, rotation and direction of the motion are refined by the images, and the map is
   /// built on the chain of refined motions: T_world_camera().
+  /// @param rate  of turn at `time`, camera axes, rad/s, from a gyroscope; empty = from the poses. Only the
+  /// stamps are judged by it.
   const MapperUpdate& add(const cv::Mat& image, Time time, const Pose& T_world_camera,
-                          const Matrix6d& motion_covariance = Matrix6d::Zero());
+                          const Matrix6d& motion_covariance = Matrix6d::Zero(),
+                          const std::optional<Eigen::Vector3d>& rate = std::nullopt);
+
+  /// No frame has come for a while: OccupancyMap::forget().
+  mapping::MapChange forget(Time now);
 
   /// The stamps of the images are corrected by health().stamp_offset from the next frame on: it is looked for
   /// anew.

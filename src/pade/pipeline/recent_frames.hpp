@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "pade/core/frame.hpp"
@@ -12,9 +13,10 @@ namespace pade {
 
 /// A frame of the recent past, its pose refined.
 struct TrackedFrame {
-  Frame frame;             ///< grey; T_world_camera is the refined one
-  Pose given;              ///< T_world_camera as it came
-  bool corrected = false;  ///< the two differ
+  Frame frame;                                         ///< grey; T_world_camera is the refined one
+  Pose given;                                          ///< T_world_camera as it came
+  bool corrected = false;                              ///< the two differ
+  std::optional<Eigen::Vector3d> rate = std::nullopt;  ///< of turn, camera axes, rad/s; empty: not given
 };
 
 /// The last frames, newest last.

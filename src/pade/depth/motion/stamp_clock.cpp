@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -22,7 +21,7 @@ constexpr double kSigmas = 4;
 constexpr double kLeastScatter = 1e-4;  // rad: no turn is known better
 constexpr double kCorrelated = 2;       // so many pairs count as one
 constexpr int kIterations = 10;
-constexpr std::size_t kFewestPairs = 6;
+constexpr std::size_t kFewestPairs = 8;
 
 /// Rate of turn at the middle of three frames, in its axes, rad/s.
 Vector3d rate(const Eigen::Quaterniond& before, const Eigen::Quaterniond& after, double seconds) {
@@ -49,36 +48,38 @@ void StampClock::clear() {
   samples_.clear();
 }
 
-bool StampClock::is_telling(Time stamp, const Pose& T_world_camera) const {
+bool StampClock::is_telling(Time stamp, const Pose& T_world_camera,
+                            const std::optional<Vector3d>& given) const {
   if (frames_.size() < 2) return false;
   const Turned& older = frames_[frames_.size() - 2];
   const Turned& last = frames_.back();
+  if (given && last.rate) return (*given - *last.rate).norm() > kUneven;
   const Vector3d before =
       rate(older.R_world_camera, last.R_world_camera, seconds_between(older.stamp, last.stamp));
   const Vector3d now = rate(last.R_world_camera, T_world_camera.rotation, seconds_between(last.stamp, stamp));
   return (now - before).norm() > kUneven;
 }
 
-void StampClock::add(Time stamp, const Pose& T_world_camera, const Vector3d& turn,
-                     const Eigen::Matrix3d& gain) {
+void StampClock::add(Time stamp, const Pose& T_world_camera, const std::optional<Vector3d>& given,
+                     const Vector3d& turn, const Eigen::Matrix3d& gain) {
   if (!frames_.empty() && !(seconds_between(frames_.back().stamp, stamp) < kLargestPeriod)) frames_.clear();
-  frames_.push_back({stamp, T_world_camera.rotation, turn, gain});
+  frames_.push_back({stamp, T_world_camera.rotation, given, turn, gain});
   if (frames_.size() < 4) return;
   // The pair is that of the two in the middle, whose rates are known by now.
-  const auto& [first, older, newer, last] = std::tie(frames_[0], frames_[1], frames_[2], frames_[3]);
-  const Vector3d w_older =
-      rate(first.R_world_camera, newer.R_world_camera, seconds_between(first.stamp, newer.stamp));
-  const Vector3d w_newer =
-      rate(older.R_world_camera, last.R_world_camera, seconds_between(older.stamp, last.stamp));
-  const Eigen::Quaterniond R_newer_older = newer.R_world_camera.conjugate() * older.R_world_camera;
-  if (newer.gain.isZero(0)) {
-    frames_.pop_front();
-    return;
-  }
-  const Vector3d per_second = -newer.gain * (w_newer - R_newer_older * w_older);
-  if (newer.turn.norm() < kLargestTurn && per_second.allFinite() && newer.turn.allFinite()) {
-    for (int i = 0; i < 3; ++i) samples_.push_back({newer.turn[i], per_second[i]});
-    while (samples_.size() > kMostSamples) samples_.pop_front();
+  const auto rate_at = [this](std::size_t i) -> Vector3d {
+    if (frames_[i].rate) return *frames_[i].rate;
+    return rate(frames_[i - 1].R_world_camera, frames_[i + 1].R_world_camera,
+                seconds_between(frames_[i - 1].stamp, frames_[i + 1].stamp));
+  };
+  const Turned& older = frames_[1];
+  const Turned& newer = frames_[2];
+  if (!newer.gain.isZero(0)) {
+    const Eigen::Quaterniond R_newer_older = newer.R_world_camera.conjugate() * older.R_world_camera;
+    const Vector3d per_second = -newer.gain * (rate_at(2) - R_newer_older * rate_at(1));
+    if (newer.turn.norm() < kLargestTurn && per_second.allFinite() && newer.turn.allFinite()) {
+      for (int i = 0; i < 3; ++i) samples_.push_back({newer.turn[i], per_second[i]});
+      while (samples_.size() > kMostSamples) samples_.pop_front();
+    }
   }
   frames_.pop_front();
 }

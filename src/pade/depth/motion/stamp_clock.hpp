@@ -22,13 +22,17 @@ class StampClock {
  public:
   /// Whether the camera turns unevenly up to this frame, so that what the images say of it is worth to find
   /// out.
-  [[nodiscard]] bool is_telling(Time stamp, const Pose& T_world_camera) const;
+  [[nodiscard]] bool is_telling(Time stamp, const Pose& T_world_camera,
+                                const std::optional<Eigen::Vector3d>& rate) const;
 
   /// The next frame.
   /// @param stamp  later than that of the last one. @param T_world_camera  as given for it
+  /// @param rate  of turn at the stamp, camera axes, rad/s; empty = central differences of the poses, which
+  /// flatten what changes faster
   /// @param turn  RefinedMotion::turn of the motion from the last frame, this one as reference. @param gain
   /// RefinedMotion::turn_gain; zero if nothing is known
-  void add(Time stamp, const Pose& T_world_camera, const Eigen::Vector3d& turn, const Eigen::Matrix3d& gain);
+  void add(Time stamp, const Pose& T_world_camera, const std::optional<Eigen::Vector3d>& rate,
+           const Eigen::Vector3d& turn, const Eigen::Matrix3d& gain);
 
   /// Nothing before counts any more: frames are missing, or their stamps are corrected from now on.
   void clear();
@@ -40,6 +44,7 @@ class StampClock {
   struct Turned {
     Time stamp;
     Eigen::Quaterniond R_world_camera;
+    std::optional<Eigen::Vector3d> rate;
     Eigen::Vector3d turn;
     Eigen::Matrix3d gain;
   };

@@ -36,9 +36,15 @@ std::uint64_t bytes_of(unsigned bits) {
 /// once.
 class FreeSpaceSearch {
  public:
-  FreeSpaceSearch(const Clearance& now, std::span<const Clearance* const> earlier, bool alone, double voxel,
-                  const VoxelStore& store, std::vector<FreeCube>& out)
-      : now_(now), alone_(alone), voxel_(voxel), store_(store), out_(out), view_(now.for_voxels(levels_)) {
+  FreeSpaceSearch(const Clearance& now, std::span<const Clearance* const> earlier, bool alone, bool again,
+                  double voxel, const VoxelStore& store, std::vector<FreeCube>& out)
+      : now_(now),
+        alone_(alone),
+        again_(again),
+        voxel_(voxel),
+        store_(store),
+        out_(out),
+        view_(now.for_voxels(levels_)) {
     for (std::size_t i = 0; i < 8; ++i) {
       const Eigen::Vector3d corner((i & 1U) != 0 ? 1 : -1, (i & 2U) != 0 ? 1 : -1, (i & 4U) != 0 ? 1 : -1);
       to_child_[i] = 0.25 * now.R_camera_world() * corner;
@@ -106,7 +112,7 @@ class FreeSpaceSearch {
   /// @param seen  what is known already of the cube that this one is a part of
   void visit(const Cube& cube, View seen, std::uint32_t open) {
     const bool has_entry = cube.depth % 3 == 1 && cube.depth >= 4;
-    if (has_entry && store_.is_least(store_.find(cube.code, cube.depth))) return;
+    if (!again_ && has_entry && store_.is_least(store_.find(cube.code, cube.depth))) return;
     if (seen != View::free) seen = now_.look_at(cube.centre, cube.side, false);
     if (seen == View::nothing) return;
     if (seen == View::free) {
@@ -129,7 +135,7 @@ class FreeSpaceSearch {
     FreeCube free{tile.code, kTileDepth, {}};
     std::uint64_t any = 0;
     for (std::size_t i = 0; i < 8; ++i) {
-      const std::uint64_t asked = known != nullptr ? ~known->least[i] : kAll;
+      const std::uint64_t asked = known != nullptr && !again_ ? ~known->least[i] : kAll;
       if (asked == 0) continue;
       const Cube cube = part_of(tile, i);
       const std::uint64_t shown = shown_by_now(cube, seen, asked);
@@ -196,6 +202,7 @@ class FreeSpaceSearch {
 
   const Clearance& now_;
   bool alone_;
+  bool again_;
   double voxel_;
   const VoxelStore& store_;
   std::vector<FreeCube>& out_;
@@ -236,9 +243,9 @@ void divide(const FreeCube& cube, std::span<const std::uint64_t> hits, std::vect
 
 }  // namespace
 
-std::size_t find_free(const Clearance& now, std::span<const Clearance* const> earlier, bool alone,
+std::size_t find_free(const Clearance& now, std::span<const Clearance* const> earlier, bool alone, bool again,
                       double voxel, const VoxelStore& store, std::vector<FreeCube>& out) {
-  return FreeSpaceSearch(now, earlier, alone, voxel, store, out).search();
+  return FreeSpaceSearch(now, earlier, alone, again, voxel, store, out).search();
 }
 
 void cut_out(std::vector<FreeCube>& cubes, std::span<const std::uint64_t> hits,

@@ -290,6 +290,31 @@ void VoxelStore::apply(std::span<const FreeCube> free, std::span<const VoxelHit>
   }
 }
 
+void VoxelStore::forget_free(std::uint64_t tile_code, const std::array<std::uint64_t, 8>& voxels,
+                             MapChange& change) {
+  if (find(tile_code, kTileDepth).part == Entry::kUnknown) return;
+  descend(root_[tile_code >> bits_below(kRootDepth)], kRootDepth, tile_code, kTileDepth, [&](Entry& entry) {
+    if (entry.part == Entry::kUniform && is_occupied(entry.value)) return;
+    VoxelTile& now = opened_tile(entry);
+    std::uint64_t left = 0;
+    bool touched = false;
+    for (std::size_t eighth = 0; eighth < 8; ++eighth) {
+      const std::uint64_t gone = voxels[eighth] & now.known[eighth] & ~now.occupied[eighth];
+      now.known[eighth] &= ~gone;
+      now.least[eighth] &= ~gone;
+      for (std::uint64_t rest = gone; rest != 0; rest &= rest - 1)
+        now.log_odds[64 * eighth + static_cast<std::size_t>(std::countr_zero(rest))] = 0;
+      append_cells(gone, tile_code + 64 * eighth, voxel_, change.became_unknown);
+      touched = touched || gone != 0;
+      left |= now.known[eighth];
+    }
+    if (touched) change.touched.push_back(cell_of(tile_code, kTileDepth, voxel_));
+    if (left != 0) return;
+    free_parts(entry, kTileDepth);
+    entry = {};
+  });
+}
+
 void VoxelStore::set(std::uint64_t code, unsigned depth, float log_odds) {
   empty_ = false;
   if (depth > kTileDepth) {

@@ -88,6 +88,8 @@ class VoxelStore {
   /// @param free  in Morton order, disjoint, without the voxels of `hits`
   /// @param hits  in Morton order
   void apply(std::span<const FreeCube> free, std::span<const VoxelHit> hits, MapChange& change);
+  /// What is free of these voxels of a tile becomes unknown.
+  void forget_free(std::uint64_t tile_code, const std::array<std::uint64_t, 8>& voxels, MapChange& change);
   /// Sets all of a cube.
   void set(std::uint64_t code, unsigned depth, float log_odds);
 

@@ -24,6 +24,7 @@
 #include "pade/report/navigation_report.hpp"
 
 #include "commands.hpp"
+#include "raw_gnss.hpp"
 
 namespace pade::cli {
 namespace {
@@ -49,6 +50,8 @@ struct NavigateArguments {
   int camera = 0;
   CLI::Option* velocity_latency_given = nullptr;
   CLI::Option* heading_given = nullptr;
+  bool raw = false;
+  double elevation_mask = 10;
   bool force = false;
   bool json = false;
 };
@@ -152,6 +155,11 @@ Result<CheckedLog> read_log(const NavigateArguments& arguments) {
 }
 
 Status navigate(const NavigateArguments& arguments) {
+  if (arguments.raw || is_raw_gnss_file(arguments.log)) {
+    gnss::PositioningOptions options;
+    options.elevation_mask = arguments.elevation_mask * kDegree;
+    return navigate_raw({arguments.log, arguments.out, options, arguments.force, arguments.json});
+  }
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kMarker);
   if (!output) return output.error();
@@ -208,10 +216,10 @@ void add_navigate(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("navigate", "Trajectory and frame-to-frame motion from IMU and GNSS");
   auto arguments = std::make_shared<NavigateArguments>();
   command
-      ->add_option(
-          "log", arguments->log,
-          "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, a ground station's .tlog, or PX4's "
-          ".ulg (docs/formats.md)")
+      ->add_option("log", arguments->log,
+                   "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, a ground station's .tlog, "
+                   "or PX4's .ulg "
+                   "(docs/formats.md); or raw GNSS: a file of RINEX 3 observations, UBX or libRSF ranges")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");
@@ -257,6 +265,13 @@ void add_navigate(CLI::App& app, Context& context) {
       "--calibration", arguments->calibration,
       "Calibration whose camera the motions are of: its mounting and time offset (else the body's)");
   command->add_option("--camera", arguments->camera, "Which camera of it, from 0")->check(CLI::Range(0, 99));
+  command->add_flag("--raw", arguments->raw,
+                    "The folder's raw GNSS alone, epoch by epoch, without IMU (docs/gnss.md)");
+  command
+      ->add_option("--elevation-mask", arguments->elevation_mask,
+                   "Of raw GNSS: lower satellites are not used, degrees")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 60.0));
   command->add_flag("--force", arguments->force, "Replace an earlier output");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->callback([arguments, &context] {

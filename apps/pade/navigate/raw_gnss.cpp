@@ -1,0 +1,125 @@
+#include "raw_gnss.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pade/io/atomic_output.hpp"
+#include "pade/io/gnss/raw_gnss_files.hpp"
+#include "pade/io/navigation/navigation_log.hpp"
+#include "pade/navigation/gnss/raw_run.hpp"
+#include "pade/report/raw_gnss_report.hpp"
+
+namespace pade::cli {
+namespace {
+
+constexpr const char* kRawMarker = "epochs.csv";
+
+nlohmann::ordered_json json_of_options(const gnss::PositioningOptions& options) {
+  nlohmann::ordered_json json;
+  visit(options, [&](const char* name, const auto& value) { json[name] = value; });
+  return json;
+}
+
+nlohmann::ordered_json raw_json(const gnss::RawLog& log, const gnss::RawRun& run,
+                                const gnss::PositioningOptions& options,
+                                const std::optional<RawScore>& score) {
+  const RawSummary s = summary_of(run);
+  nlohmann::ordered_json json = {{"epochs", s.epochs},
+                                 {"with_position", s.with_position},
+                                 {"with_velocity", s.with_velocity},
+                                 {"with_phase_step", s.with_step},
+                                 {"satellites_mean", s.satellites},
+                                 {"range_residual_rms_m", s.range_rms},
+                                 {"rate_residual_rms_mps", s.rate_rms},
+                                 {"phase_residual_rms_m", s.phase_rms},
+                                 {"phases_refused", s.slips}};
+  for (std::size_t i = 0; i < gnss::kUses; ++i) {
+    json["satellites"][gnss::to_name(static_cast<gnss::Use>(i))] = run.uses.at(i);
+  }
+  if (score) {
+    json["against_truth"] = {{"epochs", score->epochs},
+                             {"horizontal_rms_m", score->horizontal_rms},
+                             {"vertical_rms_m", score->vertical_rms}};
+  }
+  json["options"] = json_of_options(options);
+  json["remarks"] = log.remarks;
+  return json;
+}
+
+void print_summary(const gnss::RawLog& log, const gnss::RawRun& run, const std::optional<RawScore>& score) {
+  for (const std::string& remark : log.remarks) fmt::print("{}\n", remark);
+  const RawSummary s = summary_of(run);
+  fmt::print(
+      "{} epochs: {} with a position of {:.1f} satellites on average, {} with a velocity, {} with a step of "
+      "phases\n",
+      s.epochs, s.with_position, s.satellites, s.with_velocity, s.with_step);
+  fmt::print(
+      "residuals, rms: pseudorange {:.2f} m, range rate {:.3f} m/s, phase {:.1f} mm; {} phases refused\n",
+      s.range_rms, s.rate_rms, 1e3 * s.phase_rms, s.slips);
+  std::string uses;
+  for (std::size_t i = 0; i < gnss::kUses; ++i) {
+    if (run.uses.at(i) == 0) continue;
+    uses += fmt::format("{}{} {}", uses.empty() ? "" : ", ", run.uses.at(i),
+                        gnss::to_name(static_cast<gnss::Use>(i)));
+  }
+  fmt::print("satellites: {}\n", uses);
+  if (score) {
+    fmt::print("against truth, rms: horizontal {:.2f} m, vertical {:.2f} m ({} epochs)\n",
+               score->horizontal_rms, score->vertical_rms, score->epochs);
+  }
+}
+
+}  // namespace
+
+bool is_raw_gnss_file(const std::string& path) {
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(path, failure)) return false;
+  std::string start(200, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
+  start.resize(static_cast<std::size_t>(stream.gcount()));
+  return io::raw_gnss_kind(start).has_value();
+}
+
+Status navigate_raw(const RawGnssArguments& arguments) {
+  const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
+  auto output = io::OutputFolder::create(arguments.out, overwrite, kRawMarker);
+  if (!output) return output.error();
+  const auto log = io::read_raw_gnss(arguments.log);
+  if (!log) return log.error();
+  const gnss::RawRun run = gnss::run_raw(*log, arguments.options);
+  const auto fixes = gnss_log_of(run);
+  if (!fixes) {
+    return Error{fmt::format(
+        "{}: no epoch has enough satellites for a position; {} satellites without ephemeris, {} with "
+        "a stale one, {} unhealthy",
+        arguments.log, run.uses.at(static_cast<std::size_t>(gnss::Use::no_ephemeris)),
+        run.uses.at(static_cast<std::size_t>(gnss::Use::stale)),
+        run.uses.at(static_cast<std::size_t>(gnss::Use::unhealthy)))};
+  }
+  const auto score = score_positions(*log, run);
+  const auto json = raw_json(*log, run, arguments.options, score);
+  const std::string title = "Raw GNSS of " + std::filesystem::path(arguments.log).filename().string();
+  for (const auto& [file, content] : {std::pair<std::string, std::string>{kRawMarker, format_epochs(run)},
+                                      {"residuals.csv", format_residuals(run)},
+                                      {"gnss.csv", io::format_gnss(*fixes)},
+                                      {"navigation.json", json.dump(2) + "\n"},
+                                      {"report.html", raw_report(title, *log, run, score)}}) {
+    if (Status written = output->write(file, content); !written) return written;
+  }
+  if (Status committed = output->commit(); !committed) return committed;
+  if (arguments.json) {
+    fmt::print("{}\n", json.dump(2));
+    return {};
+  }
+  print_summary(*log, run, score);
+  fmt::print("{}\n", (std::filesystem::path(arguments.out) / "report.html").string());
+  return {};
+}
+
+}  // namespace pade::cli

@@ -1,0 +1,32 @@
+// A recording of raw GNSS, epoch by epoch: nothing is carried over but the last position as a guess and the
+// last phases.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "pade/navigation/gnss/positioning.hpp"
+
+namespace pade::gnss {
+
+/// What one epoch gave.
+struct EpochResult {
+  Time time;                              ///< by the receiver's clock
+  std::optional<PositionFix> position;    ///< empty if too few satellites fit
+  std::optional<VelocityFix> velocity;    ///< empty without position or Doppler
+  std::optional<PhaseStep> step;          ///< since the epoch before; empty without phases in both
+  std::vector<SatelliteView> satellites;  ///< points into the log
+};
+
+/// All epochs of a recording.
+struct RawRun {
+  std::vector<EpochResult> epochs;
+  std::array<std::size_t, kUses> uses{};  ///< of all satellites of all epochs, by Use
+  std::size_t without_position = 0;       ///< epochs
+};
+
+/// Plays a log that must outlive the result. The longest step is over 2 s.
+RawRun run_raw(const RawLog& log, const PositioningOptions& options);
+
+}  // namespace pade::gnss

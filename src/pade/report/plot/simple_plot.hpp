@@ -1,0 +1,30 @@
+// Curves and points as SVG within an HTML page, drawn without another program.
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace pade::evaluation {
+
+/// Points, joined or not.
+struct Series {
+  std::string name;
+  std::string colour;
+  std::vector<double> x;
+  std::vector<double> y;
+  bool dots = false;  ///< not joined
+
+  /// Appends a point; one that is not finite is left out.
+  void add(double at, double value) {
+    if (!std::isfinite(at) || !std::isfinite(value)) return;
+    x.push_back(at);
+    y.push_back(value);
+  }
+};
+
+/// A figure with a title, axes and a legend. `equal`: same scale on both axes.
+std::string simple_plot(const std::string& title, const std::string& x_label, const std::string& y_label,
+                        const std::vector<Series>& series, bool equal);
+
+}  // namespace pade::evaluation

@@ -1,0 +1,76 @@
+// `pade navigate` on raw GNSS alone.
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "pade/io/text.hpp"
+#include "pade/navigation/gnss/positioning.hpp"
+
+#include "apps/run_program.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace pade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// Two epochs of ten satellites over a place, and the place.
+std::string ranges_over(const Eigen::Vector3d& place) {
+  const Eigen::Matrix3d axes = gnss::enu_axes(gnss::geodetic_of(place));
+  std::string text;
+  for (int epoch = 0; epoch < 2; ++epoch) {
+    for (int i = 0; i < 10; ++i) {
+      const double azimuth = 2.4 * i, elevation = 0.3 + 0.11 * i;
+      const Eigen::Vector3d sight(std::cos(elevation) * std::sin(azimuth),
+                                  std::cos(elevation) * std::cos(azimuth), std::sin(elevation));
+      const Eigen::Vector3d satellite = place + 2.2e7 * (axes.transpose() * sight);
+      text += fmt::format("pseudorange3 {} {:.6f} 25 {:.6f} {:.6f} {:.6f} {} 1 45 44\n", epoch,
+                          gnss::range_between(satellite, place) + 777, satellite.x(), satellite.y(),
+                          satellite.z(), i + 1);
+    }
+    text += fmt::format("point3 {} {:.6f} {:.6f} {:.6f}\n", epoch, place.x() + 3, place.y(), place.z());
+  }
+  return text;
+}
+
+TEST(RawGnssCommand, WritesAFolderThatOthersCanRead) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder / "street.txt") << ranges_over(gnss::ecef_of({0.85, 0.16, 300}));
+  const auto out = folder / "out";
+  const std::string command =
+      test::kPade + " navigate " + (folder / "street.txt").string() + " --out " + out.string();
+  const auto run = test::shell(command);
+  ASSERT_EQ(run.code, 0) << run.text;
+  EXPECT_THAT(run.text, HasSubstr("2 epochs: 2 with a position of 10.0 satellites"));
+  for (const char* file : {"epochs.csv", "residuals.csv", "gnss.csv", "navigation.json", "report.html"}) {
+    EXPECT_TRUE(fs::exists(out / file)) << file;
+  }
+  const auto json = nlohmann::json::parse(*io::read_file(out / "navigation.json"));
+  EXPECT_NEAR(std::hypot(json["against_truth"]["horizontal_rms_m"].get<double>(),
+                         json["against_truth"]["vertical_rms_m"].get<double>()),
+              3, 1e-3);
+  EXPECT_EQ(json["satellites"]["used"], 20);
+  EXPECT_THAT(*io::read_file(out / "residuals.csv"), HasSubstr(",G10,"));
+  EXPECT_NE(test::shell(command).code, 0);  // it is there already
+  EXPECT_EQ(test::shell(command + " --force").code, 0);
+}
+
+TEST(RawGnssCommand, RefusesAFolderWithoutRawGnssAndLeavesNothing) {
+  const test::TemporaryFolder folder;
+  fs::create_directory(folder / "log");
+  std::ofstream(folder / "log" / "notes.txt") << "nothing\n";
+  const auto run = test::shell(test::kPade + " navigate --raw " + (folder / "log").string() + " --out " +
+                               (folder / "out").string());
+  EXPECT_EQ(run.code, 1);
+  EXPECT_THAT(run.text, HasSubstr("found no raw GNSS, expected RINEX 3 observations, UBX, or libRSF's"));
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+}  // namespace
+}  // namespace pade
