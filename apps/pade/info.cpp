@@ -20,10 +20,15 @@
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/sequence.hpp"
+#include "pade/live/recordings/tlog.hpp"
+#include "pade/live/recordings/ulog.hpp"
 #include "pade/report/run_evaluation.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
+#include "info/calibration_info.hpp"
+#include "info/info_lines.hpp"
+#include "info/recording_info.hpp"
 #include "plan/place_info.hpp"
 
 namespace pade::cli {
@@ -31,6 +36,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+using cli::json_of;
 using evaluation::PoseCheck;
 using evaluation::SceneHardness;
 using evaluation::SequenceCheck;
@@ -49,15 +55,6 @@ struct InfoArguments {
   bool json = false;
 };
 
-template <class... Values>
-void line(std::string_view name, fmt::format_string<Values...> text, Values&&... values) {
-  fmt::print("  {:<12} {}\n", name, fmt::format(text, std::forward<Values>(values)...));
-}
-
-std::string vector_text(const Eigen::Vector3d& v) {
-  return fmt::format("({:.3g}, {:.3g}, {:.3g})", v.x(), v.y(), v.z());
-}
-
 // "-y" where the direction is an axis.
 std::string direction_text(const Eigen::Vector3d& direction) {
   int axis = 0;
@@ -65,7 +62,6 @@ std::string direction_text(const Eigen::Vector3d& direction) {
   return fmt::format("{}{}", direction[axis] < 0 ? '-' : '+', "xyz"[axis]);
 }
 
-Json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Json json_of(const Spread& spread) {
   return {{"least", spread.least}, {"median", spread.median}, {"most", spread.most}};
 }
@@ -326,60 +322,6 @@ Status inform_of_map(const InfoArguments& arguments) {
   return {};
 }
 
-Json json_of(const io::Calibration& calibration) {
-  Json json = {{"kind", "calibration"},    {"dialect", calibration.format},
-               {"camera", nullptr},        {"T_body_camera", nullptr},
-               {"time_offset_s", nullptr}, {"ignored", calibration.unknown_fields}};
-  if (const auto& camera = calibration.camera) {
-    json["camera"] = {{"width", camera->width},
-                      {"height", camera->height},
-                      {"fx", camera->fx},
-                      {"fy", camera->fy},
-                      {"cx", camera->cx},
-                      {"cy", camera->cy},
-                      {"distortion_model", io::lens_name(camera->distortion)},
-                      {"distortion", camera->coefficients}};
-  }
-  if (const auto& mounting = calibration.T_body_camera) {
-    const Eigen::Matrix3d R = mounting->matrix3();
-    json["T_body_camera"] = {{"rotation_by_rows", Json::array()},
-                             {"translation_m", json_of(mounting->translation)}};
-    for (int i = 0; i < 9; ++i) json["T_body_camera"]["rotation_by_rows"].push_back(R(i / 3, i % 3));
-  }
-  if (calibration.time_offset_s) json["time_offset_s"] = *calibration.time_offset_s;
-  return json;
-}
-
-Status inform_of_calibration(const InfoArguments& arguments) {
-  const auto calibration = io::read_calibration(arguments.path, arguments.camera);
-  if (!calibration) return calibration.error();
-  if (!calibration->camera)
-    return Error{
-        fmt::format("{}: found no camera in it, expected a calibration (known dialects: docs/formats.md) or "
-                    "a map (.bt, .ot)",
-                    arguments.path)};
-  if (arguments.json) {
-    fmt::print("{}\n", json_of(*calibration).dump(2));
-    return {};
-  }
-  const Camera& camera = *calibration->camera;
-  fmt::print("{}: calibration of a camera, {}\n", arguments.path, calibration->format);
-  const std::string size = camera.width > 0 ? fmt::format("{} x {}", camera.width, camera.height)
-                                            : "size not stated (the images')";
-  line("camera", "{}, f = {:.2f} {:.2f}, c = {:.2f} {:.2f}", size, camera.fx, camera.fy, camera.cx,
-       camera.cy);
-  line("lens", "{} {}", io::lens_name(camera.distortion), fmt::join(camera.coefficients, " "));
-  if (const auto& mounting = calibration->T_body_camera) {
-    const Eigen::Matrix3d R = mounting->matrix3();
-    line("mounting", "camera at {} of the body, looking along {}, its right along {}",
-         vector_text(mounting->translation), vector_text(R.col(2)), vector_text(R.col(0)));
-  }
-  if (calibration->time_offset_s)
-    line("time", "clock of the poses - clock of the images = {:g} s", *calibration->time_offset_s);
-  for (const std::string& field : calibration->unknown_fields) line("ignored", "{}", field);
-  return {};
-}
-
 void print_timing(const io::RunTiming& timing) {
   if (timing.stages.empty()) return;
   fmt::print("  {:<12} {:>9} {:>9} {:>9} {:>9}\n", "time, ms", "median", "99 %", "largest", "mean");
@@ -445,12 +387,15 @@ Status inform(const InfoArguments& arguments) {
   std::error_code code;
   if (!fs::exists(path, code)) {
     return Error{
-        fmt::format("{}: found nothing there, expected a sequence, a map (.bt, .ot), a calibration or a run",
+        fmt::format("{}: found nothing there, expected a sequence, a map (.bt, .ot), a calibration, a "
+                    "recording (.tlog, .ulg) or a run",
                     arguments.path)};
   }
   if (!fs::is_directory(path, code)) {
+    if (live::is_tlog(path)) return inform_of_tlog(path, arguments.json);
+    if (live::is_ulog(path)) return inform_of_ulog(path, arguments.json);
     const bool map = path.extension() == ".bt" || path.extension() == ".ot";
-    return map ? inform_of_map(arguments) : inform_of_calibration(arguments);
+    return map ? inform_of_map(arguments) : inform_of_calibration(path, arguments.camera, arguments.json);
   }
   return fs::exists(path / "run.json", code) ? inform_of_run(arguments) : inform_of_sequence(arguments);
 }
@@ -470,10 +415,12 @@ void add_info(CLI::App& app, Context& context) {
       "  pade info flights/         a folder of sequences: how hard the scene of each is, and of all\n"
       "  pade info out/flight       how a run went\n"
       "  pade info out/flight/map.bt\n"
-      "  pade info camchain.yaml --camera 1     what is understood of a calibration\n");
+      "  pade info camchain.yaml --camera 1     what is understood of a calibration\n"
+      "  pade info flight.tlog      messages, and whether the sensors in them will do\n");
   command
       ->add_option("PATH", arguments->path,
-                   "Sequence, folder of sequences, map (.bt, .ot), calibration or run")
+                   "Sequence, folder of sequences, map (.bt, .ot), calibration, recording of an "
+                   "autopilot (.tlog, .ulg) or run")
       ->required();
   command->add_option("--poses", arguments->poses, "groundtruth, original or a pose file")
       ->capture_default_str();

@@ -105,12 +105,28 @@ const Wrong kLogs[] = {
      {"expected imu.csv", "found log_sensor_combined_0.csv"}},
     {"ALogThatIsNoFolder",
      [](const fs::path& f) {
+       write_file(f / "log", "no folder");
+       fs::rename(f / "log", f / "log.bin");
+     },
+     "navigate log.bin -o OUT",
+     1,
+     {"is a file", "mavlogdump"}},
+    {"ALogOfPx4ThatIsNone",
+     [](const fs::path& f) {
        write_file(f / "log", "ULog");
        fs::rename(f / "log", f / "log.ulg");
      },
      "navigate log.ulg -o OUT",
      1,
-     {"is a file", "ulog2csv"}},
+     {"log.ulg: found no log of PX4"}},
+    {"ARecordingOfAGroundStationThatIsNone",
+     [](const fs::path& f) {
+       write_file(f / "log", "no packets");
+       fs::rename(f / "log", f / "log.tlog");
+     },
+     "navigate log.tlog -o OUT",
+     1,
+     {"log.tlog: found no packet of MAVLink"}},
     {"NoHeading",
      [](const fs::path& f) {
        Recording r(1, 5);

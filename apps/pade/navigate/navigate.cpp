@@ -17,6 +17,8 @@
 #include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
+#include "pade/live/recordings/tlog.hpp"
+#include "pade/live/recordings/ulog.hpp"
 #include "pade/navigation/navigation_run.hpp"
 #include "pade/pipeline/checked_log.hpp"
 #include "pade/report/navigation_report.hpp"
@@ -137,6 +139,21 @@ nlohmann::ordered_json summary(const NavigationRun& run, const Score& score, con
   return json;
 }
 
+/// A folder, or an autopilot's recording.
+Result<CheckedLog> read_log(const NavigateArguments& arguments) {
+  const bool px4 = live::is_ulog(arguments.log);
+  if (px4 || live::is_tlog(arguments.log)) {
+    if (!arguments.gnss.empty())
+      return Error{"--gnss: found a recording, which has one GNSS; expected a folder"};
+    auto sensors = px4 ? live::read_ulog_sensors(arguments.log) : live::read_tlog_sensors(arguments.log);
+    if (!sensors) return sensors.error();
+    return checked_log(std::move(*sensors));
+  }
+  io::NavigationLogOptions options;
+  options.gnss = arguments.gnss;
+  return read_checked_log(arguments.log, options);
+}
+
 Status navigate(const NavigateArguments& arguments) {
   if (arguments.raw || is_raw_gnss_file(arguments.log)) {
     gnss::PositioningOptions options;
@@ -146,9 +163,7 @@ Status navigate(const NavigateArguments& arguments) {
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kMarker);
   if (!output) return output.error();
-  io::NavigationLogOptions log_options;
-  log_options.gnss = arguments.gnss;
-  const auto checked = read_checked_log(arguments.log, log_options);
+  const auto checked = read_log(arguments);
   if (!checked) return checked.error();
   const NavigationLog* const log = &checked->log;
   const auto options = run_options(arguments, *log);
@@ -201,10 +216,10 @@ void add_navigate(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("navigate", "Trajectory and frame-to-frame motion from IMU and GNSS");
   auto arguments = std::make_shared<NavigateArguments>();
   command
-      ->add_option(
-          "log", arguments->log,
-          "Folder with imu.csv and gnss.csv, EuRoC, or a VectorNav export (docs/formats.md); or raw GNSS: "
-          "a file of RINEX 3 observations, UBX or libRSF ranges")
+      ->add_option("log", arguments->log,
+                   "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, a ground station's .tlog, "
+                   "or PX4's .ulg "
+                   "(docs/formats.md); or raw GNSS: a file of RINEX 3 observations, UBX or libRSF ranges")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");

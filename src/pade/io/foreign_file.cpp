@@ -12,8 +12,12 @@ namespace pade::io {
 
 std::string advice_for(const std::filesystem::path& file) {
   constexpr std::string_view kUlog =
-      "a log of PX4: make tables of it (ulog2csv) and name them imu.csv (sensor_combined) and gnss.csv "
-      "(vehicle_gps_position)";
+      "a log of PX4, which pade navigate reads as it is; elsewhere make tables of it (ulog2csv) and name "
+      "them imu.csv "
+      "(sensor_combined) and gnss.csv (vehicle_gps_position)";
+  constexpr std::string_view kTlog =
+      "a recording of a ground station, which pade navigate and pade info read as it is, and nothing else "
+      "does";
   constexpr std::string_view kArduPilot =
       "a log of ArduPilot: make tables of it (mavlogdump.py --format csv --types IMU, then GPS) and name "
       "them "
@@ -28,7 +32,7 @@ std::string advice_for(const std::filesystem::path& file) {
       {{".ulg", kUlog},
        {".bin", kArduPilot},
        {".log", kArduPilot},
-       {".tlog", kArduPilot},
+       {".tlog", kTlog},
        {".bag", kBag},
        {".mcap", kBag},
        {".db3", kBag},

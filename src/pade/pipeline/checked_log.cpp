@@ -13,7 +13,11 @@ Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
                                     const io::NavigationLogOptions& options) {
   auto log = io::read_navigation_log(folder, options);
   if (!log) return log.error();
-  CheckedLog checked{std::move(*log), {}};
+  return checked_log(std::move(*log));
+}
+
+CheckedLog checked_log(NavigationLog log) {
+  CheckedLog checked{std::move(log), {}};
   auto regularised = navigation::regularise_stamps(checked.log.imu);
   checked.hints = navigation::check_log(checked.log);
   if (regularised) checked.hints.push_back(std::move(*regularised));

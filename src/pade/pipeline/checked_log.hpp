@@ -18,8 +18,11 @@ struct CheckedLog {
   NavigationLog log;
   std::vector<Hint> hints;  ///< worst first
 };
-/// Reads a log folder, puts jittering IMU stamps on a line (navigation::regularise_stamps) and checks the log
-/// (navigation::check_log). Errors: io::read_navigation_log.
+/// Puts jittering IMU stamps on a line (navigation::regularise_stamps) and checks the log
+/// (navigation::check_log).
+CheckedLog checked_log(NavigationLog log);
+
+/// The same of a log folder. Errors: io::read_navigation_log.
 Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
                                     const io::NavigationLogOptions& options = {});
 

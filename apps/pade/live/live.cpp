@@ -1,0 +1,215 @@
+// `pade live`: camera and autopilot in, sectors and a map out.
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "pade/io/atomic_output.hpp"
+#include "pade/io/formats/map_files.hpp"
+#include "pade/live/camera/folder_source.hpp"
+#include "pade/live/config.hpp"
+#include "pade/live/session.hpp"
+
+#include "commands.hpp"
+
+namespace pade::cli {
+namespace {
+
+struct LiveArguments {
+  std::string config;
+  double seconds = 0;
+  bool check = false;
+};
+
+/// Talks with the autopilot in a thread of its own, as long as it lives.
+class LinkThread {
+ public:
+  LinkThread(live::AutopilotLink& link, const live::Progress& progress)
+      : thread_([this, &link, &progress] {
+          constexpr int kRound = 5;  // ms
+          while (!over_) {
+            link.wait(kRound);
+            link.step(live::now_of_ours(), progress);
+          }
+        }) {}
+  LinkThread(const LinkThread&) = delete;
+  LinkThread& operator=(const LinkThread&) = delete;
+  ~LinkThread() {
+    over_ = true;
+    thread_.join();
+  }
+
+ private:
+  std::atomic<bool> over_{false};
+  std::thread thread_;
+};
+
+/// Everything that a session is made of.
+struct LiveParts {
+  live::LiveOptions options;
+  live::OpenCamera camera;
+  std::unique_ptr<live::AutopilotLink> link;
+};
+
+Result<LiveParts> open_parts(const LiveArguments& arguments) {
+  auto options = live::read_live_options(arguments.config);
+  if (!options) return options.error();
+  auto camera = live::open_camera(options->camera);
+  if (!camera) return camera.error();
+  auto port = live::open_port(options->link.port, options->link.baud);
+  if (!port) return port.error();
+  auto link = std::make_unique<live::AutopilotLink>(std::move(*port), options->link);
+  return LiveParts{std::move(*options), std::move(*camera), std::move(link)};
+}
+
+/// What a link carries each second against what it can, for who has to choose its speed.
+std::string link_load(const live::LiveOptions& options) {
+  constexpr double kSectors = 179, kAttitude = 44, kPosition = 40, kOdometry = 245, kClock = 30;  // bytes
+  const bool odometry = options.link.poses == live::PoseMessages::odometry;
+  const double poses = options.link.pose_rate * (odometry ? kOdometry : kAttitude + kPosition);
+  const double out = options.camera.rate * kSectors + 10 * kClock;
+  const double in = poses + 10 * kClock;
+  if (!options.link.port.starts_with("/")) {
+    return fmt::format("{:.1f} kB/s in, {:.1f} kB/s out", 1e-3 * in, 1e-3 * out);
+  }
+  const double bytes = options.link.baud / 10.0;  // start and stop bits
+  return fmt::format("{:.0f} % in, {:.0f} % out of {} baud, without what else it carries", 100 * in / bytes,
+                     100 * out / bytes, options.link.baud);
+}
+
+bool report(const char* what, bool good, const std::string& text) {
+  fmt::print("  {:<10} {:<8} {}\n", what, good ? "found" : "MISSING", text);
+  return good;
+}
+
+/// Opens everything and waits a while for what should come.
+Status check_parts(LiveParts& parts) {
+  live::Progress progress;
+  live::LiveFrame frame;
+  bool image = false;
+  live::LinkReport link;
+  {
+    const LinkThread thread(*parts.link, progress);
+    const Time start = live::now_of_ours();
+    constexpr double kPatience = 6;  // s
+    while (seconds_between(start, live::now_of_ours()) < kPatience && !io::interrupted()) {
+      constexpr int kRound = 50;  // ms
+      image = parts.camera.source->next(frame, kRound) == live::FrameSource::Outcome::frame || image;
+      link = parts.link->report();
+      if (image && link.synchronised && link.pose_messages > 0) break;
+    }
+  }
+  const Camera& camera = parts.camera.source->camera();
+  bool good = report("camera", image, fmt::format("{} x {}", camera.width, camera.height));
+  report("mounting", parts.camera.mounting_stated,
+         parts.camera.mounting_stated ? "from the calibration"
+                                      : "taken as looking ahead from the body's origin");
+  good = report("autopilot", link.autopilot.has_value(),
+                link.autopilot ? live::name_of(*link.autopilot)
+                               : "no HEARTBEAT at " + parts.options.link.port) &&
+         good;
+  good = report("clock", link.synchronised,
+                link.synchronised ? fmt::format("errs by at most {:.1f} ms", 1e3 * link.clock_bound)
+                                  : "no answer to TIMESYNC") &&
+         good;
+  good = report("poses", link.pose_messages > 0,
+                link.refused.empty() ? fmt::format("{} messages", link.pose_messages)
+                                     : "the autopilot refused " + link.refused) &&
+         good;
+  fmt::print("  {:<10} {:<8} {}\n", "link load", "", link_load(parts.options));
+  return good ? Status() : Status(Error{"something is missing (see above)"});
+}
+
+/// A line each five seconds, for the log.
+class LiveLog {
+ public:
+  void maybe(const live::Progress& progress, const live::LinkReport& link) {
+    constexpr double kPause = 5;  // s
+    const Time now = live::now_of_ours();
+    if (seconds_between(last_, now) < kPause) return;
+    last_ = now;
+    const auto age = [&](std::int64_t then) {
+      return then == 0 ? std::string("none")
+                       : fmt::format("{:.2f} s old", 1e-9 * static_cast<double>(now.nanoseconds - then));
+    };
+    fmt::print(stderr, "{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
+               live::text_of(link.missing), age(progress.image), age(progress.depth), link.sectors_sent,
+               link.in.packets, link.in.bad, link.in.gaps);
+  }
+
+ private:
+  Time last_ = live::now_of_ours();
+};
+
+void print_summary(const live::SessionCounts& counts, const live::LinkReport& link) {
+  fmt::print(
+      "{} frames: {} mapped, {} skipped, {} dropped for newer ones; {} sectors sent, {} too old to be sent\n",
+      counts.frames, counts.mapped, counts.skipped, counts.dropped, link.sectors_sent, link.sectors_stale);
+  for (const auto& [reason, count] : counts.reasons) fmt::print("  skipped {}: {}\n", count, reason);
+  if (counts.restarts > 0) fmt::print("  {} maps begun anew because the poses jumped\n", counts.restarts);
+  fmt::print("link: {} packets, {} bad, {} gaps; {} packets of ours not taken\n", link.in.packets,
+             link.in.bad, link.in.gaps, link.unsent);
+}
+
+Status run_live(const LiveArguments& arguments) {
+  io::watch_for_interrupts();
+  auto parts = open_parts(arguments);
+  if (!parts) return parts.error();
+  if (arguments.check) return check_parts(*parts);
+  const live::LiveOptions& options = parts->options;
+  live::Progress progress;
+  live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth);
+  auto session = live::Session::create(
+      {*parts->camera.source, *parts->link, {&sectors}, progress, parts->camera.T_body_camera},
+      options.session, options.mapper);
+  if (!session) return session.error();
+  {
+    const LinkThread thread(*parts->link, progress);
+    LiveLog log;
+    const Time start = live::now_of_ours();
+    session->run([&] {
+      log.maybe(progress, parts->link->report());
+      const bool over =
+          arguments.seconds > 0 && seconds_between(start, live::now_of_ours()) > arguments.seconds;
+      return over || io::interrupted();
+    });
+  }
+  print_summary(session->counts(), parts->link->report());
+  if (session->counts().mapped == 0) return Error{"nothing was mapped, so no map is saved"};
+  if (options.map.empty()) return {};
+  if (Status saved = io::write_map(session->map(), options.map, io::Overwrite::replace); !saved) return saved;
+  fmt::print("{}\n", options.map);
+  return {};
+}
+
+}  // namespace
+
+void add_live(CLI::App& app, Context& context) {
+  auto arguments = std::make_shared<LiveArguments>();
+  CLI::App* command =
+      app.add_subcommand("live", "Map beside an autopilot: camera and MAVLink in, OBSTACLE_DISTANCE out");
+  command->footer(
+      "Runs until SIGTERM or Ctrl-C, then saves the map. docs/live.md has the wiring, the autopilots' "
+      "parameters "
+      "and the file.\n"
+      "What does not exist yet: poses from our own filter, recording, autosave, OBSTACLE_DISTANCE_3D, "
+      "signing, RTSP "
+      "and video\nfiles, ROS, DDS, Foxglove, a page.");
+  command->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map")
+      ->required();
+  command->add_flag("--check", arguments->check, "Open everything, say what is missing, and end");
+  command->add_option("--for", arguments->seconds, "End after so many seconds")->check(CLI::Range(0.0, 1e6));
+  command->callback([arguments, &context] {
+    const Status status = run_live(*arguments);
+    if (status) return;
+    fmt::print(stderr, "pade live: {}\n", status.error().message);
+    context.exit_code = 1;
+  });
+}
+
+}  // namespace pade::cli

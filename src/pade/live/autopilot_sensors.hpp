@@ -1,0 +1,82 @@
+// What an autopilot says of its sensors, as measurements in the project's units and frames (body FLU, local
+// ENU): converted here and nowhere else.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pade/core/result.hpp"
+#include "pade/core/sensors/navigation_log.hpp"
+#include "pade/core/time.hpp"
+#include "pade/live/geodetic_fixes.hpp"
+#include "pade/live/mavlink/frame.hpp"
+
+namespace pade::live {
+
+/// Who flies the vehicle.
+struct Autopilot {
+  std::uint8_t system = 0;     ///< its number on the link
+  std::uint8_t component = 0;  ///< usually 1
+  std::uint8_t kind = 0;       ///< MAV_AUTOPILOT: 3 ArduPilot, 12 PX4
+  std::uint8_t vehicle = 0;    ///< MAV_TYPE: 2 quadrotor
+};
+
+/// "ArduPilot", "PX4" or "autopilot 7".
+std::string name_of(const Autopilot& autopilot);
+
+/// Stamps of an autopilot count microseconds since it started, or since 1970 if it knows the date: both as
+/// time since the start.
+class BootClock {
+ public:
+  /// Learns from SYSTEM_TIME how the two belong together; other messages change nothing.
+  void learn(const mavlink::Frame& frame);
+  /// A stamp in µs. Empty if it counts since 1970 and no SYSTEM_TIME has come yet.
+  [[nodiscard]] std::optional<Time> time_of(std::uint64_t microseconds) const;
+
+ private:
+  std::optional<std::int64_t> boot_since_1970_;  // µs
+};
+
+/// Gathers IMU, GNSS, magnetometer and barometer from the messages of one autopilot. Samples that it repeats
+/// count once.
+///
+/// HIGHRES_IMU is in SI units; SCALED_IMU in milli-g and mrad/s, and ArduPilot's RAW_IMU as well (that of
+/// others has no unit and is left out). The barometer is turned into height by the standard atmosphere.
+class SensorGatherer {
+ public:
+  /// @param autopilot  whose messages count; those of others are passed over
+  /// @param clock      which knows SYSTEM_TIME already, or learns it as messages come
+  SensorGatherer(const Autopilot& autopilot, const BootClock& clock) : autopilot_(autopilot), clock_(clock) {}
+
+  void add(const mavlink::Frame& frame);
+
+  /// All that came, stamped by the autopilot's time since its start. Positions are east, north, up of the
+  /// first fix; where the messages state no accuracy, that of io::GnssDefaults is taken, with a remark.
+  /// @param name  stands in the message. Errors: the IMU or the GNSS is missing, or the IMU is too slow to
+  ///              be integrated
+  [[nodiscard]] Result<NavigationLog> log(const std::string& name) const;
+
+ private:
+  enum Source : std::uint8_t { highres, scaled, raw };
+  template <class Message>
+  void add_integers(const Message& message, Time time, Source source);
+  void add_highres(const mavlink::Frame& frame);
+  void add_pressure(std::optional<Time> time, double hectopascal, Source source);
+  void add_fix(const mavlink::Frame& frame);
+  void add_field(Time time, const Eigen::Vector3d& frd, Source source);
+
+  Autopilot autopilot_;
+  BootClock clock_;
+  std::array<std::vector<ImuSample>, 3> imu_;  // by source
+  std::array<std::vector<MagneticField>, 3> fields_;
+  std::array<std::vector<BarometricHeight>, 2> heights_;  // HIGHRES_IMU, SCALED_PRESSURE
+  std::vector<GeodeticFix> fixes_;
+  std::size_t unitless_ = 0;  // RAW_IMU of somebody whose units nobody knows
+  std::size_t without_fix_ = 0;
+};
+
+}  // namespace pade::live

@@ -1,0 +1,76 @@
+#include "pade/live/config.hpp"
+
+#include <fmt/format.h>
+
+#include "pade/core/option_check.hpp"
+#include "pade/io/options_json.hpp"
+#include "pade/io/sequence/calibration.hpp"
+#include "pade/io/text.hpp"
+#include "pade/live/camera/folder_source.hpp"
+#include "pade/live/camera/v4l2_source.hpp"
+
+namespace pade::live {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Of a folder: what its camera.yaml says, unless another file is named.
+fs::path calibration_of(const CameraOptions& options) {
+  if (!options.calibration.empty()) return options.calibration;
+  return options.kind == CameraKind::folder ? fs::path(options.path) / "camera.yaml" : fs::path();
+}
+
+}  // namespace
+
+Status check(const LiveOptions& options) {
+  const OptionRange ranges[] = {
+      {"camera.rate", options.camera.rate, 0.1, 1000},
+      {"link.pose_rate", options.link.pose_rate, 1, 1000},
+      {"link.baud", static_cast<double>(options.link.baud), 9600, 2'000'000},
+  };
+  if (const Status status = check_ranges(ranges); !status) return status;
+  if (const Status status = check(options.session); !status) return status;
+  if (const Status status = check(options.sectors); !status) return status;
+  const bool known = options.map.empty() || options.map.ends_with(".bt") || options.map.ends_with(".ot");
+  if (!known)
+    return Error{fmt::format("map: found \"{}\", expected a name that ends in .bt or .ot", options.map)};
+  return within("mapper", check(options.mapper));
+}
+
+Result<LiveOptions> read_live_options(const fs::path& file) {
+  const auto text = io::read_file(file);
+  if (!text) return text.error();
+  LiveOptions options;
+  if (const Status status = io::from_yaml(*text, file.string(), options); !status) return status.error();
+  return options;
+}
+
+Result<OpenCamera> open_camera(const CameraOptions& options) {
+  OpenCamera opened;
+  opened.T_body_camera.rotation = Eigen::Quaterniond(forward_camera_rotation());
+  const fs::path file = calibration_of(options);
+  std::error_code code;
+  const bool any = fs::exists(file, code);
+  if (!any && options.kind == CameraKind::v4l2) {
+    return Error{fmt::format("camera.calibration: found no file \"{}\", expected the calibration of {}",
+                             file.string(), options.path)};
+  }
+  io::Calibration calibration;
+  if (any) {
+    auto read = io::read_calibration(file);
+    if (!read) return read.error();
+    calibration = std::move(*read);
+  }
+  if (calibration.T_body_camera) {
+    opened.T_body_camera = *calibration.T_body_camera;
+    opened.mounting_stated = true;
+  }
+  auto source = options.kind == CameraKind::folder
+                    ? open_folder(options.path, options.calibration)
+                    : open_v4l2(options.path, calibration.camera.value_or(Camera{}), options.rate);
+  if (!source) return source.error();
+  opened.source = std::move(*source);
+  return opened;
+}
+
+}  // namespace pade::live

@@ -1,0 +1,83 @@
+// The file that a live session is started from.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "pade/core/options.hpp"
+#include "pade/core/result.hpp"
+#include "pade/live/interfaces.hpp"
+#include "pade/live/link/autopilot_link.hpp"
+#include "pade/live/sectors.hpp"
+#include "pade/live/session.hpp"
+#include "pade/pipeline/obstacle_mapper.hpp"
+
+namespace pade::live {
+
+/// What delivers frames.
+enum class CameraKind : std::uint8_t {
+  folder,  ///< a recorded sequence at its real pace
+  v4l2,    ///< a camera of the kernel's video interface
+};
+
+/// Of the camera.
+struct CameraOptions {
+  CameraKind kind = CameraKind::v4l2;
+  std::string path = "/dev/video0";  ///< device or folder
+  std::string calibration;           ///< file (docs/formats.md); empty: the folder's own
+  double rate = 15;                  ///< frames per second that a device is asked for
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("kind", self.kind, "v4l2, or folder: a recorded sequence at its real pace");
+    field("path", self.path, "device or folder");
+    field("calibration", self.calibration, "file with lens and mounting; empty: the folder's own");
+    field("rate", self.rate, "frames per second that a device is asked for");
+  }
+};
+
+/// All of it.
+struct LiveOptions {
+  CameraOptions camera;
+  LinkOptions link;
+  SessionOptions session;
+  SectorOptions sectors;
+  ObstacleMapperOptions mapper;
+  std::string map = "map.bt";  ///< where the map is saved at the end; empty: nowhere
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("camera", self.camera, "where frames come from");
+    field("link", self.link, "the autopilot");
+    field("session", self.session, "how frames and poses meet");
+    field("sectors", self.sectors, "what is sent as OBSTACLE_DISTANCE");
+    field("mapper", self.mapper, "depth and map");
+    field("map", self.map, "file (.bt, .ot) that the map is saved to at the end; empty: nowhere");
+  }
+};
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const LiveOptions& options);
+
+/// Reads the YAML of a session. Errors name file, line and field.
+Result<LiveOptions> read_live_options(const std::filesystem::path& file);
+
+/// A camera, and where it sits.
+struct OpenCamera {
+  std::unique_ptr<FrameSource> source;
+  Pose T_body_camera;
+  bool mounting_stated = false;  ///< else it looks ahead from the body's origin
+};
+/// Errors: the camera or its calibration cannot be used.
+Result<OpenCamera> open_camera(const CameraOptions& options);
+
+}  // namespace pade::live
+
+template <>
+struct pade::EnumNames<pade::live::CameraKind> {
+  static constexpr std::array names = {std::pair{pade::live::CameraKind::folder, std::string_view("folder")},
+                                       std::pair{pade::live::CameraKind::v4l2, std::string_view("v4l2")}};
+};

@@ -1,0 +1,36 @@
+// Fixes of a receiver on the globe, as the navigation takes them: east, north, up of the first.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "pade/core/sensors/navigation_log.hpp"
+#include "pade/core/time.hpp"
+
+namespace pade::live {
+
+/// What a receiver says at one moment.
+struct GeodeticFix {
+  Time time;
+  double latitude = 0;                      ///< degrees
+  double longitude = 0;                     ///< degrees
+  double height = 0;                        ///< m, above whatever the receiver counts from
+  double horizontal = 0;                    ///< sigma, m; 0: not stated
+  double vertical = 0;                      ///< sigma, m; 0: not stated
+  std::optional<Eigen::Vector3d> velocity;  ///< east, north, up, m/s
+  double velocity_sigma = 0;                ///< m/s; 0: not stated
+  bool climbs = true;                       ///< `velocity` has a vertical part
+};
+
+/// Local coordinates of all of them. Accuracies that are not stated are those of io::GnssDefaults, with a
+/// remark; a vertical velocity that is not measured gets a sigma of 10 m/s.
+/// @param fixes   at least one
+/// @param source  message or topic, for the remarks
+GnssLog local_log(std::span<const GeodeticFix> fixes, const std::string& source,
+                  std::vector<std::string>& remarks);
+
+}  // namespace pade::live

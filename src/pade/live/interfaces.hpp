@@ -1,0 +1,80 @@
+// What a live session is put together from: where frames come from, where poses come from, where results go.
+// Times are those of our monotonic clock.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "pade/core/camera.hpp"
+#include "pade/core/pose.hpp"
+#include "pade/core/time.hpp"
+#include "pade/live/link/autopilot_poses.hpp"
+#include "pade/mapping/query/map_view.hpp"
+
+namespace pade::live {
+
+/// An image as the mapper takes it.
+struct LiveFrame {
+  cv::Mat image;  ///< 8 bit, grey or BGR, undistorted; nobody else writes into it
+  Time time;      ///< start of the exposure
+};
+
+/// A camera, or what stands for one. One thread.
+class FrameSource {
+ public:
+  /// What became of a question for the next frame.
+  enum class Outcome : unsigned char {
+    frame,    ///< here it is
+    nothing,  ///< none came in time; ask again
+    ended,    ///< none will come any more
+  };
+  FrameSource() = default;
+  FrameSource(const FrameSource&) = delete;
+  FrameSource& operator=(const FrameSource&) = delete;
+  virtual ~FrameSource() = default;
+
+  /// Waits for the next frame, at most so long, ms. A camera that was lost is opened again here.
+  virtual Outcome next(LiveFrame& frame, int milliseconds) = 0;
+  /// The pinhole camera of its frames.
+  [[nodiscard]] virtual const Camera& camera() const = 0;
+  /// CV_8UC1, 0 where no frame sees anything; empty: all valid.
+  [[nodiscard]] virtual cv::Mat mask() const = 0;
+};
+
+/// Where the vehicle was. Any thread.
+class NavigationSource {
+ public:
+  NavigationSource() = default;
+  NavigationSource(const NavigationSource&) = delete;
+  NavigationSource& operator=(const NavigationSource&) = delete;
+  virtual ~NavigationSource() = default;
+
+  /// The pose of the body at a time.
+  [[nodiscard]] virtual PoseAnswer pose_at(Time time) const = 0;
+  /// How often poses have jumped: what is before and after does not belong together.
+  [[nodiscard]] virtual std::size_t jumps() const = 0;
+};
+
+/// What a frame has changed.
+struct LiveUpdate {
+  Time time;                                     ///< of the frame
+  Pose T_world_body;                             ///< in the map's world
+  std::shared_ptr<const mapping::MapView> view;  ///< constant; may be kept
+  double depth_share = 0;                        ///< of the pixels that have a depth
+};
+
+/// Takes results. Called by the mapper's thread, so it must not wait.
+class Sink {
+ public:
+  Sink() = default;
+  Sink(const Sink&) = delete;
+  Sink& operator=(const Sink&) = delete;
+  virtual ~Sink() = default;
+
+  virtual void take(const LiveUpdate& update) = 0;
+};
+
+}  // namespace pade::live

@@ -1,0 +1,171 @@
+#include "pade/live/link/autopilot_link.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "pade/live/mavlink/estimate_messages.hpp"
+
+namespace pade::live {
+namespace {
+
+constexpr std::uint8_t kOnboardController = 18;  // MAV_TYPE_ONBOARD_CONTROLLER
+constexpr std::uint8_t kActive = 4;              // MAV_STATE_ACTIVE
+constexpr std::uint8_t kStandby = 3;             // MAV_STATE_STANDBY
+constexpr std::uint8_t kVersion = 3;             // of MAVLink, as all heartbeats say
+constexpr std::uint8_t kWarning = 4;             // MAV_SEVERITY
+constexpr std::uint8_t kInformation = 6;
+constexpr std::uint16_t kSetMessageInterval = 511;  // MAV_CMD_SET_MESSAGE_INTERVAL
+constexpr double kOldest = 0.3;                     // age of a frame behind sectors, s
+
+Time later(Time time, double seconds) {
+  return {time.nanoseconds + static_cast<std::int64_t>(seconds * 1e9)};
+}
+
+}  // namespace
+
+template <class Message>
+void AutopilotLink::send(const Message& message) {
+  const mavlink::Packet packet = pack(message, sender_);
+  if (!port_->write(packet.span())) ++report_.unsent;
+}
+
+void AutopilotLink::say(std::uint8_t severity, std::string_view text) {
+  mavlink::StatusText message;
+  message.severity = severity;
+  const std::string line = fmt::format("PADE: {}", text);
+  std::copy_n(line.begin(), std::min(line.size(), message.text.size()), message.text.begin());
+  send(message);
+}
+
+void AutopilotLink::step(Time now, const Progress& progress) {
+  std::array<std::uint8_t, 2048> bytes;
+  const std::lock_guard lock(mutex_);
+  constexpr int kMostReads = 64;  // so that a flood of bytes does not keep anything from being sent
+  for (int i = 0; i < kMostReads; ++i) {
+    const std::size_t count = port_->read(bytes);
+    if (count == 0) break;
+    parser_.add(std::span(bytes).first(count), [&](const mavlink::Frame& frame) { take(frame, now); });
+  }
+  report_.in = parser_.counts();
+  if (!report_.autopilot) return;
+  ask(now);
+  send_sectors(now);
+  send_health(now, progress);
+}
+
+void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
+  if (const auto heartbeat = mavlink::unpack<mavlink::Heartbeat>(frame); heartbeat && !report_.autopilot) {
+    if (heartbeat->autopilot == mavlink::kNoAutopilot || frame.component != mavlink::kAutopilotComponent)
+      return;
+    report_.autopilot = Autopilot{frame.system, frame.component, heartbeat->autopilot, heartbeat->type};
+    sender_.system = frame.system;  // PX4 drops what another system sends
+    return;
+  }
+  const auto& autopilot = report_.autopilot;
+  if (!autopilot || frame.system != autopilot->system || frame.component != autopilot->component) return;
+  if (frame.id == mavlink::Timesync::kId) return take_timesync(frame, now);
+  if (const auto ack = mavlink::unpack<mavlink::CommandAck>(frame); ack && ack->result != 0) {
+    report_.refused = fmt::format("command {} (result {})", ack->command, ack->result);
+  }
+  poses_.add(frame);
+}
+
+void AutopilotLink::take_timesync(const mavlink::Frame& frame, Time now) {
+  const auto m = mavlink::unpack<mavlink::Timesync>(frame);
+  if (m->tc1 == 0) {
+    send(mavlink::Timesync{now.nanoseconds, m->ts1, frame.system, frame.component});
+    return;
+  }
+  constexpr std::int64_t kLongest = 1'000'000'000;  // ns; older ones are not answers to questions of ours
+  const bool ours = m->ts1 > 0 && m->ts1 <= now.nanoseconds && now.nanoseconds - m->ts1 < kLongest;
+  if (ours && m->tc1 > 0) clock_.add({m->ts1}, {m->tc1}, now);
+}
+
+/// For its clock, and for poses at the rate that is wanted.
+void AutopilotLink::ask(Time now) {
+  if (now >= next_question_) {
+    send(mavlink::Timesync{0, now.nanoseconds, report_.autopilot->system, report_.autopilot->component});
+    next_question_ = later(now, clock_.synchronised() ? 0.1 : 0.05);
+  }
+  if (now < next_request_) return;
+  constexpr double kPatience = 2;  // s
+  const auto enough = static_cast<std::size_t>(0.7 * options_.pose_rate * kPatience);
+  const bool come = next_request_.nanoseconds != 0 && poses_.messages() - asked_for_ >= 2 * enough;
+  next_request_ = later(now, kPatience);
+  asked_for_ = poses_.messages();
+  if (come) return;
+  const bool odometry = options_.poses == PoseMessages::odometry;
+  const std::vector<std::uint32_t> messages =
+      odometry ? std::vector{mavlink::Odometry::kId}
+               : std::vector{mavlink::AttitudeQuaternion::kId, mavlink::LocalPositionNed::kId};
+  for (const std::uint32_t id : messages) {
+    mavlink::CommandLong command;
+    command.target_system = report_.autopilot->system;
+    command.target_component = report_.autopilot->component;
+    command.command = kSetMessageInterval;
+    command.param1 = static_cast<float>(id);
+    command.param2 = static_cast<float>(1e6 / options_.pose_rate);  // µs
+    send(command);
+  }
+}
+
+void AutopilotLink::send_sectors(Time now) {
+  if (!offered_) return;
+  if (seconds_between(offered_frame_, now) <= kOldest) {
+    send(*offered_);
+    ++report_.sectors_sent;
+  } else {
+    ++report_.sectors_stale;
+  }
+  offered_.reset();
+}
+
+/// A heartbeat each second, and at once where something has changed.
+void AutopilotLink::send_health(Time now, const Progress& progress) {
+  const auto newest = clock_.to_ours(poses_.newest());
+  const bool any = poses_.newest().nanoseconds != 0 && newest.has_value();
+  const Missing missing = missing_now(now, progress, any ? newest->nanoseconds : 0, clock_.synchronised());
+  const bool first = next_heartbeat_.nanoseconds == 0;
+  const bool changed = missing != report_.missing;
+  report_.missing = missing;
+  if (changed || first) say(missing == Missing::nothing ? kInformation : kWarning, text_of(missing));
+  if (!changed && now < next_heartbeat_) return;
+  mavlink::Heartbeat heartbeat;
+  heartbeat.type = kOnboardController;
+  heartbeat.autopilot = mavlink::kNoAutopilot;
+  heartbeat.system_status = missing == Missing::nothing ? kActive : kStandby;
+  heartbeat.mavlink_version = kVersion;
+  send(heartbeat);
+  next_heartbeat_ = later(now, 1);
+}
+
+PoseAnswer AutopilotLink::pose_at(Time time) const {
+  const std::lock_guard lock(mutex_);
+  const auto theirs = clock_.to_autopilot(time);
+  return theirs ? poses_.at(*theirs) : PoseAnswer{};
+}
+
+std::size_t AutopilotLink::jumps() const {
+  const std::lock_guard lock(mutex_);
+  return poses_.jumps();
+}
+
+void AutopilotLink::offer(const mavlink::ObstacleDistance& sectors, Time frame) {
+  const std::lock_guard lock(mutex_);
+  offered_ = sectors;
+  offered_frame_ = frame;
+}
+
+LinkReport AutopilotLink::report() const {
+  const std::lock_guard lock(mutex_);
+  LinkReport report = report_;
+  report.synchronised = clock_.synchronised();
+  report.clock_bound = clock_.bound();
+  report.clock_restarts = clock_.restarts();
+  report.pose_messages = poses_.messages();
+  return report;
+}
+
+}  // namespace pade::live

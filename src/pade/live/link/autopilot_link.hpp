@@ -1,0 +1,101 @@
+// The talk with the autopilot: its poses and clock in, sectors and health out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pade/core/options.hpp"
+#include "pade/live/autopilot_sensors.hpp"
+#include "pade/live/interfaces.hpp"
+#include "pade/live/link/autopilot_poses.hpp"
+#include "pade/live/link/health.hpp"
+#include "pade/live/link/port.hpp"
+#include "pade/live/link_clock.hpp"
+#include "pade/live/mavlink/codec.hpp"
+#include "pade/live/mavlink/link_messages.hpp"
+#include "pade/live/mavlink/parser.hpp"
+
+namespace pade::live {
+
+/// Options of AutopilotLink.
+struct LinkOptions {
+  std::string port = "udp:14540";               ///< udp:PORT, or a serial device
+  int baud = 921600;                            ///< of a serial device
+  PoseMessages poses = PoseMessages::estimate;  ///< where poses come from
+  double pose_rate = 30;                        ///< Hz that the autopilot is asked for
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& field) {
+    field("port", self.port, "udp:PORT, or a serial device such as /dev/ttyAMA0");
+    field("baud", self.baud, "of a serial device");
+    field("poses", self.poses,
+          "estimate: ATTITUDE_QUATERNION (else ATTITUDE) and LOCAL_POSITION_NED; odometry: ODOMETRY");
+    field("pose_rate", self.pose_rate, "Hz that the autopilot is asked for");
+  }
+};
+
+/// What a link has done so far.
+struct LinkReport {
+  mavlink::LinkCounts in;
+  std::optional<Autopilot> autopilot;  ///< once its heartbeat has come
+  bool synchronised = false;           ///< with its clock
+  double clock_bound = 0;              ///< of the clock's error, s
+  std::size_t clock_restarts = 0;
+  std::size_t pose_messages = 0;
+  std::size_t sectors_sent = 0;
+  std::size_t sectors_stale = 0;  ///< too old when their turn came, so not sent
+  std::size_t unsent = 0;         ///< packets that the port did not take
+  std::string refused;            ///< the last request that the autopilot refused; empty if none
+  Missing missing = Missing::camera;
+};
+
+/// One for each autopilot. step() belongs to one thread, all else to any.
+class AutopilotLink : public NavigationSource {
+ public:
+  AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options)
+      : port_(std::move(port)), options_(options), poses_(options.poses) {}
+
+  /// Waits for bytes, at most so long, ms.
+  void wait(int milliseconds) { port_->wait(milliseconds); }
+  /// Reads what has come, answers, and sends what is due. To be called a hundred times a second.
+  void step(Time now, const Progress& progress);
+
+  [[nodiscard]] PoseAnswer pose_at(Time time) const override;
+  [[nodiscard]] std::size_t jumps() const override;
+  /// Sectors of a frame, sent at the next step unless they are older than 0.3 s by then; those before them
+  /// that were not sent are forgotten.
+  void offer(const mavlink::ObstacleDistance& sectors, Time frame);
+  [[nodiscard]] LinkReport report() const;
+
+ private:
+  void take(const mavlink::Frame& frame, Time now);
+  void take_timesync(const mavlink::Frame& frame, Time now);
+  void ask(Time now);
+  void send_sectors(Time now);
+  void send_health(Time now, const Progress& progress);
+  void say(std::uint8_t severity, std::string_view text);
+  template <class Message>
+  void send(const Message& message);
+
+  std::unique_ptr<Port> port_;
+  LinkOptions options_;
+  mavlink::Parser parser_;
+  mavlink::Sender sender_;
+  Time next_question_, next_request_, next_heartbeat_;
+  std::size_t asked_for_ = 0;  // pose messages when the streams were last asked for
+
+  mutable std::mutex mutex_;  // of all below
+  AutopilotPoses poses_;
+  LinkClock clock_;
+  LinkReport report_;
+  std::optional<mavlink::ObstacleDistance> offered_;
+  Time offered_frame_;
+};
+
+}  // namespace pade::live

@@ -1,0 +1,135 @@
+#include "pade/live/link/autopilot_poses.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pade/live/mavlink/codec.hpp"
+#include "pade/live/mavlink/estimate_messages.hpp"
+
+namespace pade::live {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using mavlink::unpack;
+
+constexpr double kKept = 3;              // s
+constexpr double kFarthestApart = 0.25;  // s
+
+Time since_start(std::uint32_t ms) { return {static_cast<std::int64_t>(ms) * 1'000'000}; }
+
+Quaterniond quaternion(float w, float x, float y, float z) {
+  return {static_cast<double>(w), static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
+}
+
+Vector3d vector(float x, float y, float z) { return Eigen::Vector3f(x, y, z).cast<double>(); }
+
+/// Yaw, then pitch, then roll.
+Quaterniond from_angles(double roll, double pitch, double yaw) {
+  return Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Vector3d::UnitY()) *
+         Eigen::AngleAxisd(roll, Vector3d::UnitX());
+}
+
+/// Where a time lies among samples.
+struct Bracket {
+  PoseAnswer::Kind kind = PoseAnswer::Kind::not_yet;
+  std::size_t after = 0;  ///< index of the sample at or behind the time
+  double share = 0;       ///< of the way to it from the one before
+  std::string_view why;
+};
+
+template <class Samples>
+Bracket bracket(const Samples& samples, Time time) {
+  using Kind = PoseAnswer::Kind;
+  if (samples.empty() || samples.back().time < time) return {};
+  const auto after =
+      std::find_if(samples.begin(), samples.end(), [&](const auto& sample) { return sample.time >= time; });
+  const auto index = static_cast<std::size_t>(after - samples.begin());
+  if (after->time == time) return {Kind::valid, index, 1, {}};
+  if (index == 0) return {Kind::never, 0, 0, "the image is older than the poses"};
+  const auto& before = samples[index - 1];
+  const double gap = seconds_between(before.time, after->time);
+  if (gap > kFarthestApart) return {Kind::never, 0, 0, "a gap in the poses"};
+  return {Kind::valid, index, seconds_between(before.time, time) / gap, {}};
+}
+
+}  // namespace
+
+template <class Samples, class Value>
+void AutopilotPoses::push(Samples& samples, Time time, const Value& value) {
+  if (!samples.empty() && seconds_between(time, samples.back().time) > 1) jump();  // its clock went back
+  if (!samples.empty() && time <= samples.back().time) return;
+  samples.push_back({time, value});
+  ++count_;
+  while (seconds_between(samples.front().time, time) > kKept) samples.pop_front();
+}
+
+void AutopilotPoses::jump() {
+  attitudes_.clear();
+  positions_.clear();
+  ++jumps_;
+}
+
+void AutopilotPoses::add_attitude(Time time, const Quaterniond& q_ned_frd) {
+  // North is y of ENU; forward-right-down and forward-left-up differ by half a turn about x.
+  static const Quaterniond R_enu_ned((Eigen::Matrix3d() << 0, 1, 0, 1, 0, 0, 0, 0, -1).finished());
+  static const Quaterniond R_frd_flu(0, 1, 0, 0);
+  if (!(std::abs(q_ned_frd.norm() - 1) < 0.01)) return;
+  push(attitudes_, time, (R_enu_ned * q_ned_frd * R_frd_flu).normalized());
+}
+
+void AutopilotPoses::add_position(Time time, const Vector3d& ned) {
+  if (!ned.allFinite()) return;
+  push(positions_, time, Vector3d(ned.y(), ned.x(), -ned.z()));
+}
+
+void AutopilotPoses::add_odometry(const mavlink::Frame& frame) {
+  constexpr std::uint8_t kLocalNed = 1;
+  const auto m = unpack<mavlink::Odometry>(frame);
+  if (!m || m->frame_id != kLocalNed) return;
+  if (reset_counter_ >= 0 && reset_counter_ != m->reset_counter) jump();
+  reset_counter_ = m->reset_counter;
+  const Time time{static_cast<std::int64_t>(m->time_usec % 4'600'000'000'000'000) * 1000};
+  add_attitude(time, quaternion(m->q[0], m->q[1], m->q[2], m->q[3]));
+  add_position(time, vector(m->x, m->y, m->z));
+}
+
+void AutopilotPoses::add(const mavlink::Frame& frame) {
+  if (messages_ == PoseMessages::odometry) {
+    if (frame.id == mavlink::Odometry::kId) add_odometry(frame);
+    return;
+  }
+  if (const auto m = unpack<mavlink::AttitudeQuaternion>(frame)) {
+    quaternions_ = true;
+    add_attitude(since_start(m->time_boot_ms), quaternion(m->q1, m->q2, m->q3, m->q4));
+  } else if (const auto a = unpack<mavlink::Attitude>(frame); a && !quaternions_) {
+    const Vector3d angles = vector(a->roll, a->pitch, a->yaw);
+    add_attitude(since_start(a->time_boot_ms), from_angles(angles.x(), angles.y(), angles.z()));
+  } else if (const auto p = unpack<mavlink::LocalPositionNed>(frame)) {
+    add_position(since_start(p->time_boot_ms), vector(p->x, p->y, p->z));
+  }
+}
+
+PoseAnswer AutopilotPoses::at(Time time) const {
+  const Bracket turn = bracket(attitudes_, time);
+  const Bracket place = bracket(positions_, time);
+  using Kind = PoseAnswer::Kind;
+  if (turn.kind == Kind::never) return {Kind::never, {}, turn.why};
+  if (place.kind == Kind::never) return {Kind::never, {}, place.why};
+  if (turn.kind == Kind::not_yet || place.kind == Kind::not_yet) return {};
+  PoseAnswer answer{Kind::valid, {}, {}};
+  const auto& q = attitudes_[turn.after].value;
+  const auto& p = positions_[place.after].value;
+  answer.T_world_body.rotation =
+      turn.share < 1 ? attitudes_[turn.after - 1].value.slerp(turn.share, q).normalized() : q;
+  answer.T_world_body.translation =
+      place.share < 1 ? Vector3d((1 - place.share) * positions_[place.after - 1].value + place.share * p) : p;
+  return answer;
+}
+
+Time AutopilotPoses::newest() const {
+  if (attitudes_.empty() || positions_.empty()) return {};
+  return std::min(attitudes_.back().time, positions_.back().time);
+}
+
+}  // namespace pade::live

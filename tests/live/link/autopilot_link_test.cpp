@@ -1,0 +1,243 @@
+// The talk with a simulated autopilot, in simulated time.
+#include "pade/live/link/autopilot_link.hpp"
+
+#include <cmath>
+#include <deque>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pade/live/mavlink/estimate_messages.hpp"
+
+namespace pade::live {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr std::int64_t kMillisecond = 1'000'000;
+constexpr std::uint8_t kActiveState = 4;
+
+/// What went over the line.
+struct Line {
+  std::vector<std::uint8_t> to_us;
+  std::vector<std::uint8_t> from_us;
+};
+
+class LoopPort : public Port {
+ public:
+  explicit LoopPort(Line& line) : line_(line) {}
+  void wait(int /*milliseconds*/) override {}
+  std::size_t read(std::span<std::uint8_t> bytes) override {
+    const std::size_t count = std::min(bytes.size(), line_.to_us.size());
+    const auto end = line_.to_us.begin() + static_cast<std::ptrdiff_t>(count);
+    std::copy(line_.to_us.begin(), end, bytes.begin());
+    line_.to_us.erase(line_.to_us.begin(), end);
+    return count;
+  }
+  bool write(std::span<const std::uint8_t> bytes) override {
+    line_.from_us.insert(line_.from_us.end(), bytes.begin(), bytes.end());
+    return true;
+  }
+
+ private:
+  Line& line_;
+};
+
+/// An autopilot that flies north at 2 m/s, heading north, and whose clock is 1000 s behind ours.
+class Bench {
+ public:
+  Bench() : link_(std::make_unique<LoopPort>(line_), {}) {}
+
+  /// Goes on in steps of 10 ms of our clock.
+  void run(double seconds) {
+    for (int i = 0; i < std::lround(100 * seconds); ++i) {
+      now_.nanoseconds += 10 * kMillisecond;
+      if (camera) progress_.image = now_.nanoseconds - 60 * kMillisecond;
+      if (mapper) progress_.mapper = now_.nanoseconds;
+      if (depth) progress_.depth = now_.nanoseconds - 120 * kMillisecond;
+      const std::int64_t ms = now_.nanoseconds / kMillisecond;
+      const auto boot = static_cast<std::uint32_t>(ms - 1'000'000);
+      if (heartbeat && ms % 1000 == 0) tell(mavlink::Heartbeat{2, 12, 0, 0, 4, 3});
+      if (poses && ms % 20 == 0) tell(mavlink::AttitudeQuaternion{boot, 1, 0, 0, 0, 0, 0, 0, {}});
+      if (poses && ms % 30 == 0) {
+        tell(mavlink::LocalPositionNed{boot, 0.002F * static_cast<float>(boot), 0, -5, 2, 0, 0});
+      }
+      if (questions && ms % 100 == 50) tell(mavlink::Timesync{0, 77'000 + ms});
+      link_.step(now_, progress_);
+      hear();
+    }
+  }
+  AutopilotLink& link() { return link_; }
+  [[nodiscard]] Time now() const { return now_; }
+
+  bool heartbeat = true, poses = true, questions = false, answers = true;
+  bool camera = true, mapper = true, depth = true;
+  std::uint8_t ack = 0;
+
+  /// What we sent, by time.
+  struct Said {
+    Time time;
+    std::uint8_t state = 0;
+  };
+  std::vector<Said> heartbeats;
+  std::vector<std::pair<Time, std::string>> texts;
+  std::vector<Time> sectors;
+  std::vector<mavlink::CommandLong> commands;
+  std::vector<std::int64_t> answered;  ///< ts1 of their questions
+  std::vector<std::uint8_t> systems;
+  std::size_t packets = 0;
+
+ private:
+  template <class Message>
+  void tell(const Message& message) {
+    const mavlink::Packet packet = pack(message, sender_);
+    line_.to_us.insert(line_.to_us.end(), packet.bytes.begin(),
+                       packet.bytes.begin() + static_cast<std::ptrdiff_t>(packet.length));
+  }
+  void hear() {
+    parser_.add(line_.from_us, [&](const mavlink::Frame& frame) {
+      ++packets;
+      systems.push_back(frame.system);
+      if (const auto m = mavlink::unpack<mavlink::Heartbeat>(frame))
+        heartbeats.push_back({now_, m->system_status});
+      if (const auto m = mavlink::unpack<mavlink::StatusText>(frame))
+        texts.emplace_back(now_, m->text.data());
+      if (mavlink::unpack<mavlink::ObstacleDistance>(frame)) sectors.push_back(now_);
+      if (const auto m = mavlink::unpack<mavlink::CommandLong>(frame)) {
+        commands.push_back(*m);
+        tell(mavlink::CommandAck{m->command, ack});
+      }
+      const auto sync = mavlink::unpack<mavlink::Timesync>(frame);
+      if (sync && sync->tc1 == 0 && answers) {
+        tell(mavlink::Timesync{now_.nanoseconds - 1'000'000 * kMillisecond, sync->ts1});
+      }
+      if (sync && sync->tc1 != 0) answered.push_back(sync->ts1);
+    });
+    line_.from_us.clear();
+  }
+
+  Line line_;
+  AutopilotLink link_;
+  mavlink::Sender sender_{7, 1, 0};
+  mavlink::Parser parser_;
+  Progress progress_;
+  Time now_{1'500'000 * kMillisecond};
+};
+
+TEST(AutopilotLink, SaysNothingBeforeItHasHeardTheAutopilot) {
+  Bench bench;
+  bench.heartbeat = false;
+  bench.run(3);
+  EXPECT_EQ(bench.packets, 0U);
+  EXPECT_FALSE(bench.link().report().autopilot);
+}
+
+TEST(AutopilotLink, TakesTheSystemOfTheAutopilotAndAnswersItsQuestions) {
+  Bench bench;
+  bench.questions = true;
+  bench.run(4);
+  ASSERT_GT(bench.packets, 0U);
+  for (const std::uint8_t system : bench.systems) EXPECT_EQ(system, 7);
+  ASSERT_GT(bench.answered.size(), 25U);
+  EXPECT_EQ(bench.answered.front() % 1000, bench.now().nanoseconds / kMillisecond % 1000 + 50);
+  EXPECT_EQ(bench.link().report().autopilot->system, 7);
+}
+
+TEST(AutopilotLink, GivesPosesByOurClockWithin3Seconds) {
+  Bench bench;
+  bench.run(3);
+  ASSERT_TRUE(bench.link().report().synchronised);
+  const Time asked{bench.now().nanoseconds - 100 * kMillisecond};
+  const PoseAnswer answer = bench.link().pose_at(asked);
+  ASSERT_EQ(answer.kind, PoseAnswer::Kind::valid);
+  const double boot = static_cast<double>(asked.nanoseconds) * 1e-9 - 1000;
+  // The answers to our questions wait for the next step: half of 10 ms at 2 m/s.
+  EXPECT_NEAR(answer.T_world_body.translation.y(), 2 * boot, 0.011);
+  EXPECT_NEAR(answer.T_world_body.translation.z(), 5, 1e-6);
+  EXPECT_EQ(bench.link().pose_at({bench.now().nanoseconds + 100 * kMillisecond}).kind,
+            PoseAnswer::Kind::not_yet);
+}
+
+TEST(AutopilotLink, AsksForPosesUntilTheyCome) {
+  Bench bench;
+  bench.poses = false;
+  bench.ack = 4;  // MAV_RESULT_FAILED
+  bench.run(5);
+  const std::size_t asked = bench.commands.size();
+  ASSERT_GE(asked, 4U);
+  EXPECT_EQ(bench.commands[0].command, 511);
+  EXPECT_EQ(bench.commands[0].param1, 31);
+  EXPECT_EQ(bench.commands[1].param1, 32);
+  EXPECT_NEAR(bench.commands[0].param2, 33333, 1);
+  EXPECT_THAT(bench.link().report().refused, HasSubstr("511 (result 4)"));
+  bench.poses = true;
+  bench.run(4);
+  const std::size_t then = bench.commands.size();
+  bench.run(10);
+  EXPECT_EQ(bench.commands.size(), then);
+}
+
+TEST(AutopilotLink, IsActiveOnceAllIsThereWithAHeartbeatEachSecond) {
+  Bench bench;
+  bench.run(5);
+  EXPECT_EQ(bench.link().report().missing, Missing::nothing);
+  bench.heartbeats.clear();
+  bench.run(10);
+  EXPECT_EQ(bench.heartbeats.size(), 10U);
+  for (const auto& said : bench.heartbeats) EXPECT_EQ(said.state, kActiveState);
+  EXPECT_THAT(bench.texts.back().second, StartsWith("PADE: obstacle mapping active"));
+}
+
+/// Turns an input off and on, and expects that to be said in time.
+void expect_said(bool Bench::*input, const std::string& text) {
+  Bench bench;
+  bench.run(5);
+  ASSERT_EQ(bench.link().report().missing, Missing::nothing);
+  bench.*input = false;
+  const Time off = bench.now();
+  bench.run(3);
+  const auto silent = std::find_if(bench.heartbeats.begin(), bench.heartbeats.end(),
+                                   [&](const auto& h) { return h.time > off && h.state != kActiveState; });
+  ASSERT_NE(silent, bench.heartbeats.end());
+  EXPECT_LE(seconds_between(off, silent->time), 0.5);
+  EXPECT_THAT(bench.texts.back().second, HasSubstr(text));
+  EXPECT_LE(seconds_between(off, bench.texts.back().first), 0.5);
+  bench.*input = true;
+  const Time on = bench.now();
+  bench.run(2);
+  const auto back = std::find_if(bench.heartbeats.begin(), bench.heartbeats.end(),
+                                 [&](const auto& h) { return h.time > on && h.state == kActiveState; });
+  ASSERT_NE(back, bench.heartbeats.end());
+  EXPECT_LE(seconds_between(on, back->time), 1);
+}
+
+TEST(AutopilotLink, NamesACameraThatStalls) { expect_said(&Bench::camera, "no image from the camera"); }
+TEST(AutopilotLink, NamesPosesThatStopComing) { expect_said(&Bench::poses, "no pose from the autopilot"); }
+TEST(AutopilotLink, NamesAMapperThatIsBlocked) { expect_said(&Bench::mapper, "the mapper does not get on"); }
+TEST(AutopilotLink, NamesHoverWhereThereIsNoDepth) { expect_said(&Bench::depth, "no parallax (hover?)"); }
+
+TEST(AutopilotLink, SectorsAreSentOnceAndNeverOld) {
+  Bench bench;
+  bench.run(5);
+  bench.link().offer({}, {bench.now().nanoseconds - 100 * kMillisecond});
+  bench.run(1);
+  EXPECT_EQ(bench.sectors.size(), 1U);
+  bench.link().offer({}, {bench.now().nanoseconds - 350 * kMillisecond});
+  bench.run(1);
+  EXPECT_EQ(bench.sectors.size(), 1U);
+  EXPECT_EQ(bench.link().report().sectors_stale, 1U);
+}
+
+TEST(AutopilotLink, WithoutAnswersAboutTheClockThereIsNoPose) {
+  Bench bench;
+  bench.answers = false;
+  bench.run(5);
+  EXPECT_EQ(bench.link().pose_at(bench.now()).kind, PoseAnswer::Kind::not_yet);
+  EXPECT_EQ(bench.link().report().missing, Missing::clock);
+  EXPECT_THAT(bench.texts.back().second, HasSubstr("no TIMESYNC"));
+}
+
+}  // namespace
+}  // namespace pade::live

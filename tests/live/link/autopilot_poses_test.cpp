@@ -1,0 +1,138 @@
+// Poses between messages: frames, brackets, jumps.
+#include "pade/live/link/autopilot_poses.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "pade/live/mavlink/codec.hpp"
+#include "pade/live/mavlink/estimate_messages.hpp"
+
+namespace pade::live {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Kind = PoseAnswer::Kind;
+
+template <class Message>
+void add_to(AutopilotPoses& poses, const Message& message) {
+  mavlink::Sender sender{1, 1, 0};
+  const mavlink::Packet packet = pack(message, sender);
+  poses.add(mavlink::look(packet.span()).frame);
+}
+
+Time at_ms(std::int64_t ms) { return {ms * 1'000'000}; }
+
+mavlink::AttitudeQuaternion facing(std::uint32_t ms, float yaw_ned) {
+  return {ms, std::cos(yaw_ned / 2), 0, 0, std::sin(yaw_ned / 2), 0, 0, 0, {}};
+}
+
+TEST(AutopilotPoses, NorthEastDownBecomesEastNorthUp) {
+  AutopilotPoses poses(PoseMessages::estimate);
+  add_to(poses, facing(1000, std::numbers::pi_v<float> / 2));  // east
+  add_to(poses, mavlink::LocalPositionNed{1000, 1, 2, -3, 0, 0, 0});
+  const PoseAnswer answer = poses.at(at_ms(1000));
+  ASSERT_EQ(answer.kind, Kind::valid);
+  EXPECT_TRUE(answer.T_world_body.translation.isApprox(Vector3d(2, 1, 3)));
+  const Eigen::Matrix3d R = answer.T_world_body.matrix3();
+  EXPECT_TRUE(R.col(0).isApprox(Vector3d(1, 0, 0), 1e-6));  // ahead: east
+  EXPECT_TRUE(R.col(1).isApprox(Vector3d(0, 1, 0), 1e-6));  // left: north
+  EXPECT_TRUE(R.col(2).isApprox(Vector3d(0, 0, 1), 1e-6));
+}
+
+TEST(AutopilotPoses, AnglesMeanTheSameAsTheQuaternion) {
+  AutopilotPoses angles(PoseMessages::estimate), quaternions(PoseMessages::estimate);
+  const double roll = 0.2, pitch = -0.3, yaw = 2;
+  const Quaterniond q = Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) *
+                        Eigen::AngleAxisd(pitch, Vector3d::UnitY()) *
+                        Eigen::AngleAxisd(roll, Vector3d::UnitX());
+  add_to(angles, mavlink::Attitude{500, 0.2F, -0.3F, 2.0F, 0, 0, 0});
+  const Eigen::Quaternionf f = q.cast<float>();
+  add_to(quaternions, mavlink::AttitudeQuaternion{500, f.w(), f.x(), f.y(), f.z(), 0, 0, 0, {}});
+  for (AutopilotPoses* const poses : {&angles, &quaternions}) {
+    add_to(*poses, mavlink::LocalPositionNed{500, 0, 0, 0, 0, 0, 0});
+  }
+  const Pose a = angles.at(at_ms(500)).T_world_body;
+  const Pose b = quaternions.at(at_ms(500)).T_world_body;
+  EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-6);
+  // Nose down by 0.3 rad: what is ahead lies below.
+  EXPECT_NEAR((a.rotation * Vector3d::UnitX()).z(), std::sin(pitch), 1e-6);
+  // Rolled to the right: the left wing is up.
+  EXPECT_GT((a.rotation * Vector3d::UnitY()).z(), 0.15);
+}
+
+TEST(AutopilotPoses, LiesBetweenTwoMessagesAndIsNeverGuessed) {
+  AutopilotPoses poses(PoseMessages::estimate);
+  EXPECT_EQ(poses.at(at_ms(5)).kind, Kind::not_yet);
+  add_to(poses, facing(1000, 0));
+  add_to(poses, mavlink::LocalPositionNed{990, 0, 0, 0, 0, 0, 0});
+  add_to(poses, facing(1020, 0.2F));
+  EXPECT_EQ(poses.at(at_ms(1010)).kind, Kind::not_yet);  // the position is still to come
+  add_to(poses, mavlink::LocalPositionNed{1030, 4, 0, 0, 0, 0, 0});
+  const PoseAnswer answer = poses.at(at_ms(1010));
+  ASSERT_EQ(answer.kind, Kind::valid);
+  EXPECT_NEAR(answer.T_world_body.translation.y(), 2, 1e-9);
+  const Vector3d ahead = answer.T_world_body.rotation * Vector3d::UnitX();
+  EXPECT_NEAR(std::atan2(ahead.x(), ahead.y()), 0.1, 1e-6);  // from north towards east
+  EXPECT_EQ(poses.at(at_ms(1025)).kind, Kind::not_yet);
+  EXPECT_EQ(poses.at(at_ms(985)).kind, Kind::never);
+  EXPECT_EQ(poses.at(at_ms(985)).why, "the image is older than the poses");
+  add_to(poses, facing(2000, 0));
+  add_to(poses, mavlink::LocalPositionNed{2000, 4, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.at(at_ms(1500)).kind, Kind::never);
+  EXPECT_EQ(poses.at(at_ms(1500)).why, "a gap in the poses");
+}
+
+mavlink::Odometry odometry(std::uint64_t ms, float north, std::uint8_t resets) {
+  mavlink::Odometry m;
+  m.time_usec = ms * 1000;
+  m.frame_id = 1;
+  m.child_frame_id = 12;
+  m.x = north;
+  m.q = {1, 0, 0, 0};
+  m.reset_counter = resets;
+  return m;
+}
+
+TEST(AutopilotPoses, AJumpOfOdometryDividesBeforeFromAfter) {
+  AutopilotPoses poses(PoseMessages::odometry);
+  add_to(poses, facing(1000, 0));  // not asked for
+  EXPECT_EQ(poses.messages(), 0U);
+  auto other_frame = odometry(1000, 0, 7);
+  other_frame.frame_id = 20;
+  add_to(poses, other_frame);
+  EXPECT_EQ(poses.messages(), 0U);
+  add_to(poses, odometry(1000, 0, 7));
+  add_to(poses, odometry(1030, 1, 7));
+  EXPECT_EQ(poses.at(at_ms(1015)).kind, Kind::valid);
+  EXPECT_EQ(poses.jumps(), 0U);
+  add_to(poses, odometry(1060, 50, 8));
+  EXPECT_EQ(poses.jumps(), 1U);
+  EXPECT_EQ(poses.at(at_ms(1045)).kind, Kind::never);
+  add_to(poses, odometry(1090, 51, 8));
+  const PoseAnswer answer = poses.at(at_ms(1075));
+  ASSERT_EQ(answer.kind, Kind::valid);
+  EXPECT_NEAR(answer.T_world_body.translation.y(), 50.5, 1e-6);
+}
+
+TEST(AutopilotPoses, AClockThatGoesBackIsAJump) {
+  AutopilotPoses poses(PoseMessages::estimate);
+  add_to(poses, facing(90'000, 0));
+  add_to(poses, mavlink::LocalPositionNed{90'000, 0, 0, 0, 0, 0, 0});
+  add_to(poses, facing(100, 0));
+  EXPECT_EQ(poses.jumps(), 1U);
+  add_to(poses, mavlink::LocalPositionNed{100, 0, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.at(at_ms(100)).kind, Kind::valid);
+}
+
+TEST(AutopilotPoses, WhatIsNoRotationIsLeftOut) {
+  AutopilotPoses poses(PoseMessages::estimate);
+  add_to(poses, mavlink::AttitudeQuaternion{});
+  add_to(poses, mavlink::LocalPositionNed{0, std::nanf(""), 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.messages(), 0U);
+}
+
+}  // namespace
+}  // namespace pade::live

@@ -1,0 +1,136 @@
+// A session in real time, with a camera and poses that are made here.
+#include "pade/live/session.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "live/wall_camera.hpp"
+
+namespace pade::live {
+namespace {
+
+/// Facing north, to the east.
+class EastwardPoses : public NavigationSource {
+ public:
+  explicit EastwardPoses(Time zero) : zero_(zero) {}
+  [[nodiscard]] PoseAnswer pose_at(Time time) const override {
+    if (!come) return {};
+    PoseAnswer answer{PoseAnswer::Kind::valid, {}, {}};
+    answer.T_world_body.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
+    answer.T_world_body.translation.x() = kSpeed * seconds_between(zero_, time);
+    return answer;
+  }
+  [[nodiscard]] std::size_t jumps() const override { return jumped; }
+
+  std::atomic<bool> come{true};
+  std::atomic<std::size_t> jumped{0};
+
+ private:
+  Time zero_;
+};
+
+class Gatherer : public Sink {
+ public:
+  void take(const LiveUpdate& update) override {
+    if (pause > 0) std::this_thread::sleep_for(std::chrono::milliseconds(pause));
+    ages.push_back(seconds_between(update.time, now_of_ours()));
+    last = update;
+  }
+  std::vector<double> ages;
+  LiveUpdate last;
+  std::atomic<int> pause{0};  // ms
+};
+
+/// A session for some seconds.
+struct Bed {
+  explicit Bed(double rate) : camera(rate), poses(camera.zero) {
+    Pose mounting;
+    mounting.rotation = Eigen::Quaterniond(forward_camera_rotation());
+    ObstacleMapperOptions mapper;
+    mapper.map.voxel = 0.25;  // a pixel sees 5 cm of the wall
+    SessionOptions options;
+    options.velocity_sigma = 0.02;
+    auto made = Session::create({camera, poses, {&gatherer}, progress, mounting}, options, mapper);
+    EXPECT_TRUE(made) << made.error().message;
+    session = std::make_unique<Session>(std::move(*made));
+  }
+  template <class Meanwhile>
+  const SessionCounts& run(double seconds, const Meanwhile& meanwhile) {
+    const Time start = now_of_ours();
+    session->run([&] {
+      const double elapsed = seconds_between(start, now_of_ours());
+      meanwhile(elapsed);
+      return elapsed > seconds;
+    });
+    return session->counts();
+  }
+  WallCamera camera;
+  EastwardPoses poses;
+  Gatherer gatherer;
+  Progress progress;
+  std::unique_ptr<Session> session;
+};
+
+void expect_all_counted(const SessionCounts& counts, std::size_t delivered) {
+  EXPECT_EQ(counts.frames, delivered);
+  EXPECT_EQ(counts.frames, counts.mapped + counts.skipped + counts.dropped);
+}
+
+TEST(Session, MapsTheWallAhead) {
+  Bed bed(10);
+  const auto& counts = bed.run(2, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_GT(counts.mapped, 8U);
+  ASSERT_FALSE(bed.gatherer.ages.empty());
+  const LiveUpdate& last = bed.gatherer.last;
+  EXPECT_GT(last.depth_share, 0.3);
+  const auto distances = obstacle_distances(*last.view, last.T_world_body, SectorOptions{});
+  EXPECT_NEAR(distances[0], 285, 50);
+  EXPECT_EQ(distances[36], kUnknownDistance);  // behind
+  EXPECT_GT(bed.progress.depth, 0);
+  EXPECT_TRUE(bed.session->map().bounds().max().y() > 2.5);
+}
+
+TEST(Session, AFrameWhosePoseDoesNotComeIsSkippedAfterItsTime) {
+  Bed bed(10);
+  bed.poses.come = false;
+  const auto& counts = bed.run(1.5, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_EQ(counts.mapped, 0U);
+  EXPECT_GT(counts.reasons.at("no pose in time"), 5U);
+  EXPECT_EQ(bed.progress.depth, 0);
+}
+
+TEST(Session, FramesWaitForLatePoses) {
+  // Poses come in bursts, twelve times a second: nothing is lost.
+  Bed bed(10);
+  const auto& counts = bed.run(2, [&](double elapsed) { bed.poses.come = std::fmod(elapsed, 0.08) > 0.05; });
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_GT(counts.mapped * 10, counts.frames * 7);
+}
+
+TEST(Session, ASlowMapperDropsOldFramesAndKeepsTheNewest) {
+  Bed bed(40);
+  bed.gatherer.pause = 150;
+  const auto& counts = bed.run(2, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_GT(counts.dropped, counts.frames / 3);
+  EXPECT_GT(counts.mapped, 5U);
+}
+
+TEST(Session, AJumpOfThePosesBeginsTheMapAnew) {
+  Bed bed(10);
+  const auto& counts = bed.run(1.6, [&](double elapsed) { bed.poses.jumped = elapsed > 0.8 ? 1 : 0; });
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_EQ(counts.restarts, 1U);
+}
+
+}  // namespace
+}  // namespace pade::live
