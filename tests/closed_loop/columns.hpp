@@ -24,7 +24,9 @@ inline Place built(simulation::World world) {
   return {std::move(scene).value(), std::move(surface).value()};
 }
 
-/// Columns 0.6 m wide and 4 m tall, of gravel like the ground, under a blank sky.
+inline constexpr double column_radius = 0.3;  // m
+
+/// Columns 4 m tall, of gravel like the ground, under a blank sky.
 /// @param at  their axes, m
 inline Place columns(const std::vector<Eigen::Vector2d>& at) {
   using namespace simulation;
@@ -33,8 +35,11 @@ inline Place columns(const std::vector<Eigen::Vector2d>& at) {
   stone.pattern.kind = PatternKind::gravel;
   world.visuals.push_back({"ground", {}, Rectangle{Eigen::Vector3d::UnitZ(), {200, 200}}, stone, true});
   for (const auto& p : at)
-    world.visuals.push_back(
-        {"column", {Eigen::Quaterniond::Identity(), {p.x(), p.y(), 2}}, Cylinder{0.3, 4}, stone, true});
+    world.visuals.push_back({"column",
+                             {Eigen::Quaterniond::Identity(), {p.x(), p.y(), 2}},
+                             Cylinder{column_radius, 4},
+                             stone,
+                             true});
   return built(std::move(world));
 }
 

@@ -38,7 +38,7 @@ TEST(ExactFlight, GoesAroundColumnsThatStandInItsWay) {
     // The clearance in closed form, of meadow and columns.
     double nearest = s.state.position.z();
     for (const Eigen::Vector2d& p : {Eigen::Vector2d(5, 0.1), {9, -1.2}, {9, 1.0}, {12, 0}})
-      nearest = std::min(nearest, (s.state.position.head<2>() - p).norm() - 0.25);
+      nearest = std::min(nearest, (s.state.position.head<2>() - p).norm() - column_radius);
     EXPECT_NEAR(s.clearance, std::min(nearest, 2.0), 1e-6);
   }
 }
