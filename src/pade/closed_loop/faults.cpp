@@ -9,7 +9,13 @@ namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
-using namespace simulation;
+using simulation::Box;
+using simulation::is_passable;
+using simulation::OpenWorldScene;
+using simulation::Scene;
+using simulation::SurfaceDistance;
+using simulation::Visual;
+using simulation::World;
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// Along the ground from start to goal.

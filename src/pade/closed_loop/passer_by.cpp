@@ -8,7 +8,14 @@ namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
-using namespace simulation;
+using simulation::Capsule;
+using simulation::FrameMaker;
+using simulation::FrameOptions;
+using simulation::PatternKind;
+using simulation::Rendering;
+using simulation::Scene;
+using simulation::Visual;
+using simulation::World;
 constexpr double kRadius = 0.3;  // m
 constexpr double kHeight = 1.8;  // m
 constexpr double kPace = 1.4;    // m/s

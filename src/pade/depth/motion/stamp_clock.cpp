@@ -24,7 +24,7 @@ constexpr int kIterations = 10;
 constexpr std::size_t kFewestPairs = 8;
 
 /// Rate of turn at the middle of three frames, in its axes, rad/s.
-Vector3d rate(const Eigen::Quaterniond& before, const Eigen::Quaterniond& after, double seconds) {
+Vector3d mean_rate(const Eigen::Quaterniond& before, const Eigen::Quaterniond& after, double seconds) {
   return rotation_log(before.conjugate() * after) / seconds;
 }
 
@@ -49,27 +49,28 @@ void StampClock::clear() {
 }
 
 bool StampClock::is_telling(Time stamp, const Pose& T_world_camera,
-                            const std::optional<Vector3d>& given) const {
+                            const std::optional<Vector3d>& rate) const {
   if (frames_.size() < 2) return false;
   const Turned& older = frames_[frames_.size() - 2];
   const Turned& last = frames_.back();
-  if (given && last.rate) return (*given - *last.rate).norm() > kUneven;
+  if (rate && last.rate) return (*rate - *last.rate).norm() > kUneven;
   const Vector3d before =
-      rate(older.R_world_camera, last.R_world_camera, seconds_between(older.stamp, last.stamp));
-  const Vector3d now = rate(last.R_world_camera, T_world_camera.rotation, seconds_between(last.stamp, stamp));
+      mean_rate(older.R_world_camera, last.R_world_camera, seconds_between(older.stamp, last.stamp));
+  const Vector3d now =
+      mean_rate(last.R_world_camera, T_world_camera.rotation, seconds_between(last.stamp, stamp));
   return (now - before).norm() > kUneven;
 }
 
-void StampClock::add(Time stamp, const Pose& T_world_camera, const std::optional<Vector3d>& given,
+void StampClock::add(Time stamp, const Pose& T_world_camera, const std::optional<Vector3d>& rate,
                      const Vector3d& turn, const Eigen::Matrix3d& gain) {
   if (!frames_.empty() && !(seconds_between(frames_.back().stamp, stamp) < kLargestPeriod)) frames_.clear();
-  frames_.push_back({stamp, T_world_camera.rotation, given, turn, gain});
+  frames_.push_back({stamp, T_world_camera.rotation, rate, turn, gain});
   if (frames_.size() < 4) return;
   // The pair is that of the two in the middle, whose rates are known by now.
   const auto rate_at = [this](std::size_t i) -> Vector3d {
     if (frames_[i].rate) return *frames_[i].rate;
-    return rate(frames_[i - 1].R_world_camera, frames_[i + 1].R_world_camera,
-                seconds_between(frames_[i - 1].stamp, frames_[i + 1].stamp));
+    return mean_rate(frames_[i - 1].R_world_camera, frames_[i + 1].R_world_camera,
+                     seconds_between(frames_[i - 1].stamp, frames_[i + 1].stamp));
   };
   const Turned& older = frames_[1];
   const Turned& newer = frames_[2];
