@@ -10,7 +10,7 @@ namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
-using namespace pade::simulation;
+using simulation::RenderOptions;
 
 ChainFlightOptions quick() {
   ChainFlightOptions options;

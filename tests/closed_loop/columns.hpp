@@ -29,7 +29,11 @@ inline constexpr double column_radius = 0.3;  // m
 /// Columns 4 m tall, of gravel like the ground, under a blank sky.
 /// @param at  their axes, m
 inline Place columns(const std::vector<Eigen::Vector2d>& at) {
-  using namespace simulation;
+  using simulation::Cylinder;
+  using simulation::Material;
+  using simulation::PatternKind;
+  using simulation::Rectangle;
+  using simulation::World;
   World world;
   Material stone;
   stone.pattern.kind = PatternKind::gravel;

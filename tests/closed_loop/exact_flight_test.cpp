@@ -10,7 +10,6 @@ namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
-using namespace pade::simulation;
 
 ExactFlightOptions quick() {
   ExactFlightOptions options;

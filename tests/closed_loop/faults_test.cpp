@@ -14,7 +14,14 @@ namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
-using namespace simulation;
+using simulation::Box;
+using simulation::FrameMaker;
+using simulation::FrameOptions;
+using simulation::is_passable;
+using simulation::OpenWorldScene;
+using simulation::Rectangle;
+using simulation::Rendering;
+using simulation::World;
 
 OpenWorldScene world_of(Place place, const Vector3d& goal) {
   return {std::move(place.scene), std::move(place.surface), {0, 0, 1.6}, goal, 0};

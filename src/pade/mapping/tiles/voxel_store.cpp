@@ -183,13 +183,14 @@ void VoxelStore::miss(VoxelTile& tile, std::size_t eighth, std::uint64_t voxels)
   }
 }
 
-void VoxelStore::put(VoxelTile& tile, std::size_t voxel, float value) const {
+void VoxelStore::put(VoxelTile& tile, std::size_t voxel, float log_odds) const {
   const std::size_t eighth = voxel / 64;
   const std::uint64_t mask = std::uint64_t{1} << voxel % 64;
-  tile.log_odds[voxel] = value;
+  tile.log_odds[voxel] = log_odds;
   tile.known[eighth] |= mask;
-  tile.least[eighth] = value <= rules_.least ? tile.least[eighth] | mask : tile.least[eighth] & ~mask;
-  tile.occupied[eighth] = is_occupied(value) ? tile.occupied[eighth] | mask : tile.occupied[eighth] & ~mask;
+  tile.least[eighth] = log_odds <= rules_.least ? tile.least[eighth] | mask : tile.least[eighth] & ~mask;
+  tile.occupied[eighth] =
+      is_occupied(log_odds) ? tile.occupied[eighth] | mask : tile.occupied[eighth] & ~mask;
 }
 
 /// One pass over a tile: `free` and `hits` are what lies in it.
