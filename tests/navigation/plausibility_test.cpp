@@ -104,6 +104,35 @@ TEST(LogCheck, MeasuresTheLagOfThePositionsAlone) {
   }
 }
 
+TEST(LogCheck, SeesVelocitiesThatPartFromThePositions) {
+  const auto flown = [](const Vector3d& bias) {
+    auto log = record({.rest = 2, .speed = 2}, 240, simulation::ImuModel::consumer(),
+                      simulation::GnssModel::single_point(), 1);
+    for (GnssVelocity& v : log.gnss.velocities) v.velocity += bias;
+    return log;
+  };
+  EXPECT_FALSE(position_drift(flown(Vector3d::Zero()).gnss, 0));
+  EXPECT_THAT(check_log(flown(Vector3d::Zero())), Not(has("gnss-drift")));
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto log = flown(-0.2 * Vector3d::Unit(axis));
+    const auto drift = position_drift(log.gnss, 0);
+    ASSERT_TRUE(drift) << axis;
+    EXPECT_EQ(drift->axis, axis);
+    EXPECT_NEAR(drift->metres / drift->seconds, -0.2, 0.05);
+    EXPECT_THAT(check_log(log), has("gnss-drift"));
+  }
+}
+
+TEST(LogCheck, AGapInTheVelocitiesIsNoDrift) {
+  auto log = record({.rest = 2, .speed = 2}, 240, simulation::ImuModel::consumer(),
+                    simulation::GnssModel::single_point(), 1);
+  std::erase_if(log.gnss.velocities, [&](const GnssVelocity& v) {
+    const double t = seconds_between(log.gnss.velocities.front().time, v.time);
+    return t > 60 && t < 130;
+  });
+  EXPECT_FALSE(position_drift(log.gnss, 0));
+}
+
 TEST(LogCheck, TellsWhatIsLate) {
   // Both are late by 0.5 s, the positions by another 0.3 s.
   auto log = record({.rest = 2, .speed = 2}, 120, simulation::ImuModel::consumer(),

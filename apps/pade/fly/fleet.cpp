@@ -67,7 +67,8 @@ Result<OpenWorldScene> shortened(OpenWorldScene world, double way) {
   const Eigen::Vector3d along = (world.goal - world.start).normalized();
   const Eigen::Vector3d left = Eigen::Vector3d::UnitZ().cross(along).normalized();
   for (int step = 0; step < 2 * kSteps; ++step) {
-    const double aside = kAside * ((step + 1) / 2) * (step % 2 == 0 ? 1 : -1);
+    const int away = (step + 1) / 2;
+    const double aside = kAside * away * (step % 2 == 0 ? 1 : -1);
     const Eigen::Vector3d goal = world.start + way * along + aside * left;
     if (world.surface.touches(goal, kRoom) || !simulation::is_passable(world.surface, world.start, goal))
       continue;

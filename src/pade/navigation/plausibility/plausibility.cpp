@@ -222,10 +222,26 @@ Late late_one(const PositionLag& apart, const ForceMatch& imu, double velocity_l
   return moved < kClearly * as_stamped ? Late::velocities : Late::either;
 }
 
-/// Positions and velocities that are apart in time.
-void check_apart(const GnssLog& gnss, const ForceMatch& imu, double velocity_lag, std::vector<Hint>& hints) {
+/// Positions and velocities that part.
+void check_drift(const GnssLog& gnss, double lag, std::vector<Hint>& hints) {
+  const auto drift = position_drift(gnss, lag);
+  if (!drift) return;
+  constexpr std::array kAxes = {"to the east", "to the north", "upward"};
+  add(hints, "gnss-drift", HintSeverity::warning,
+      fmt::format("the velocities of the GNSS fly {:.0f} m farther {} than its positions in {:.0f} s ({:.2f} "
+                  "m/s on average)",
+                  drift->metres, kAxes[static_cast<std::size_t>(drift->axis)], drift->seconds,
+                  drift->metres / drift->seconds),
+      "one of them has a bias, and places drift with the velocities: give the worse one a larger sigma in "
+      "gnss.csv, "
+      "and do not rely on heights or places over minutes");
+}
+
+/// Positions and velocities that are apart in time. @return by how much, s
+double check_apart(const GnssLog& gnss, const ForceMatch& imu, double velocity_lag,
+                   std::vector<Hint>& hints) {
   const auto apart = position_lag(gnss);
-  if (!apart) return;
+  if (!apart) return 0;
   const Late late = late_one(*apart, imu, velocity_lag);
   const auto options = [](double position, double velocity) {
     return fmt::format("--gnss-latency {:.2f} --gnss-velocity-latency {:.2f}", position, velocity);
@@ -245,6 +261,7 @@ void check_apart(const GnssLog& gnss, const ForceMatch& imu, double velocity_lag
                         of_positions, of_velocities)
           : fmt::format("give both latencies ({}), or correct the stamps",
                         late == Late::positions ? of_positions : of_velocities));
+  return apart->seconds;
 }
 
 /// What of the readings of IMU and GNSS fits best. Returns the seconds that the velocities are late, 0 where
@@ -343,7 +360,7 @@ std::vector<Hint> check_log(const NavigationLog& log) {
   const bool contradicts = std::any_of(hints.begin(), hints.end(), [](const Hint& hint) {
     return hint.severity == HintSeverity::error && hint.id != "upside-down";
   });
-  if (!contradicts) check_apart(log.gnss, given, velocity_lag, hints);
+  if (!contradicts) check_drift(log.gnss, check_apart(log.gnss, given, velocity_lag, hints), hints);
   return hints;
 }
 

@@ -25,6 +25,7 @@ namespace pade::navigation {
 ///   gnss-axes          velocities of the GNSS in north, east, down called east, north, up
 ///   gnss-lag           velocities of the GNSS late or early, by tenths of a second or by leap seconds
 ///   gnss-apart         positions and velocities of the GNSS apart in time, and which of them is late
+///   gnss-drift         positions and integrated velocities of the GNSS part by many metres
 ///   gnss-degrees       latitude and longitude where metres are expected
 ///   gnss-contradiction positions and velocities of the GNSS do not belong together
 ///   imu-contradiction  IMU and GNSS do not belong together, and no reading above explains it

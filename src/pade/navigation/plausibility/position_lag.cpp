@@ -28,6 +28,8 @@ class Flown {
     for (const GnssVelocity& velocity : gnss.velocities) {
       const double t = seconds_between(zero_, velocity.time);
       if (!times_.empty() && t <= times_.back()) continue;
+      if (!times_.empty() && t - times_.back() > kLongestStep) ++span_;
+      spans_.push_back(span_);
       if (last != nullptr) sum += 0.5 * (t - times_.back()) * (last->velocity + velocity.velocity);
       times_.push_back(t);
       ways_.push_back(sum);
@@ -49,7 +51,15 @@ class Flown {
     return ways_[i] + s * velocities_[i] + 0.5 * s * s / step * (velocities_[i + 1] - velocities_[i]);
   }
 
+  /// Number of the stretch without a gap that holds t, where until(t) is a number.
+  [[nodiscard]] int span(double t) const {
+    const auto after = std::upper_bound(times_.begin(), times_.end(), t);
+    return spans_[static_cast<std::size_t>(after - times_.begin()) - 1];
+  }
+
  private:
+  int span_ = 0;
+  std::vector<int> spans_;
   Time zero_;
   std::vector<double> times_;
   std::vector<Vector3d> ways_;
@@ -117,6 +127,35 @@ std::optional<PositionLag> position_lag(const GnssLog& gnss) {
   const auto count = static_cast<double>(ways.size());
   return PositionLag{best, std::abs(best) * std::sqrt(variance / (none - least)), std::sqrt(none / count),
                      std::sqrt(least / count)};
+}
+
+std::optional<PositionDrift> position_drift(const GnssLog& gnss, double lag) {
+  constexpr double kLeast = 10;  // m
+  const Flown flown(gnss);
+  std::optional<PositionDrift> found;
+  double most = 1;  // of the limits
+  int span = -1;
+  double since = 0;
+  Vector3d start = Vector3d::Zero();
+  for (const GnssFix& fix : gnss.fixes) {
+    const double t = flown.seconds(fix.time) - lag;
+    const Vector3d beyond = flown.until(t) - fix.position;
+    if (!beyond.allFinite()) continue;
+    if (flown.span(t) != span) {
+      span = flown.span(t);
+      since = t;
+      start = beyond;
+    }
+    const Vector3d parted = beyond - start;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double sigma = std::sqrt(fix.covariance(axis, axis));
+      const double limit = kLeast + (std::isfinite(sigma) ? kSigmas * sigma : 0);
+      if (!(std::abs(parted[axis]) > most * limit)) continue;
+      most = std::abs(parted[axis]) / limit;
+      found = PositionDrift{axis, parted[axis], t - since};
+    }
+  }
+  return found;
 }
 
 }  // namespace pade::navigation

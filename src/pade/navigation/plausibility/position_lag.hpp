@@ -1,4 +1,5 @@
-// How late the positions of a GNSS are against its velocities.
+// Whether the positions of a GNSS and its velocities are of one flight: how late the ones are against the
+// others, and whether they part.
 #pragma once
 
 #include <optional>
@@ -20,5 +21,17 @@ struct PositionLag {
 /// as the vehicle turns or changes its speed; a flight straight on hides it. Empty where there is none or the
 /// log cannot tell.
 std::optional<PositionLag> position_lag(const GnssLog& gnss);
+
+/// How far positions and integrated velocities part, along the axis on which they part most.
+struct PositionDrift {
+  int axis = 0;        ///< 0 east, 1 north, 2 up
+  double metres = 0;   ///< largest, of what the velocities fly beyond the positions
+  double seconds = 0;  ///< until then, without a gap in the velocities
+};
+
+/// Where they part by more than 10 m and five sigmas of a fix: velocities with a bias of some cm/s or more,
+/// which the gate of no single one shows. Empty where they do not, or the log cannot tell.
+/// @param lag  of the positions against the velocities, s (PositionLag)
+std::optional<PositionDrift> position_drift(const GnssLog& gnss, double lag);
 
 }  // namespace pade::navigation

@@ -65,7 +65,7 @@ std::string id_of(std::string_view wanted, std::string_view content) {
   if (wanted.empty()) {
     Fingerprint digest;
     digest.bytes(content.data(), content.size());
-    return "plot-" + digest.hex();
+    return fmt::format("plot-{}", digest.hex());
   }
   std::string id(wanted);
   for (char& c : id) {
