@@ -62,5 +62,41 @@ TEST(OpenWorld, StartAndGoalAreFreeAndThereIsAWay) {
   fs::remove_all(folder);
 }
 
+struct Things {
+  Scene scene;
+  SurfaceDistance surface;
+};
+
+/// What stands in a world or lies about in it: all but the ground.
+Things things_of(World world) {
+  std::erase_if(world.visuals,
+                [](const Visual& visual) { return std::holds_alternative<Rectangle>(visual.shape); });
+  auto scene = Scene::build(std::move(world));
+  EXPECT_TRUE(scene.ok());
+  auto surface = SurfaceDistance::build(*scene);
+  EXPECT_TRUE(surface.ok());
+  return {std::move(scene).value(), std::move(surface).value()};
+}
+
+/// The climb begins 0.4 m above the ground, where a loose stone is in the way of the vehicle, and the planner
+/// takes it that 1.5 m about the climb are free.
+TEST(OpenWorld, NothingLiesWhereAFlightBeginsAndEnds) {
+  const fs::path folder = fs::temp_directory_path() / "pade_open_world_room_test";
+  for (const auto& [kind, name] : EnumNames<OpenWorldKind>::names) {
+    for (std::uint64_t seed = 101; seed <= 140; ++seed) {
+      const OpenWorld made = generate_open_world(kind, seed, 400);
+      ASSERT_TRUE(write_world(made.files, folder / "world.sdf").ok());
+      auto world = read_sdf(folder / "world.sdf");
+      ASSERT_TRUE(world.ok());
+      const Things things = things_of(std::move(world).value());
+      for (double climb = 0; climb <= 1.2; climb += 0.3)
+        EXPECT_GT(things.surface.to(made.start - climb * Vector3d::UnitZ()), 1.5) << name << " " << seed;
+      EXPECT_GT(things.surface.to(made.goal), 1.5) << name << " " << seed;
+      EXPECT_GT(things.surface.to(made.goal - 1.2 * Vector3d::UnitZ()), 1.5) << name << " " << seed;
+    }
+  }
+  fs::remove_all(folder);
+}
+
 }  // namespace
 }  // namespace pade::simulation

@@ -41,6 +41,11 @@ class OpenGenerator : Furniture {
   [[nodiscard]] int count(double half_width) const {
     return static_cast<int>(std::lround(density_ * (kEast - kWest) * 2 * half_width / 1e4));
   }
+  /// Whether a thing of that reach leaves start and goal free.
+  [[nodiscard]] static bool leaves_room(const Vector3d& foot, double reach) {
+    const Vector3d level(foot.x(), foot.y(), 0);
+    return level.norm() > kFreeStart + reach && (level - Vector3d(kWay, 0, 0)).norm() > kFreeGoal + reach;
+  }
   bool place(double half_width, double reach, Vector3d& foot);
   template <class Make>
   void scatter(int things, double half_width, double reach, const Make& make);
@@ -63,9 +68,7 @@ class OpenGenerator : Furniture {
 bool OpenGenerator::place(double half_width, double reach, Vector3d& foot) {
   for (int i = 0; i < 60; ++i) {
     foot = {random_.uniform(kWest, kEast), random_.uniform(-half_width, half_width), 0};
-    const bool open =
-        foot.norm() > kFreeStart + reach && (foot - Vector3d(kWay, 0, 0)).norm() > kFreeGoal + reach;
-    if (open && std::none_of(taken_.begin(), taken_.end(),
+    if (leaves_room(foot, reach) && std::none_of(taken_.begin(), taken_.end(),
                              [&](const Vector3d& other) { return (other - foot).norm() < kApart; })) {
       taken_.push_back(foot);
       return true;
@@ -135,14 +138,21 @@ void OpenGenerator::slab(const Vector3d& foot) {
            {random_.uniform(-1, 1), random_.uniform(-0.6, 0.6), random_.uniform(0, 2 * kPi)});
 }
 
+/// A stone that would reach into the room about start or goal is drawn like the others and left out, so that
+/// nothing else of the world changes with it.
 void OpenGenerator::stones(int things, double half_width) {
+  constexpr double kReach = 0.7;  // of the mesh, at size 1
+  const auto lay = [&](const std::string& file, const Vector3d& at, double yaw, const Vector3d& size,
+                       const Finish& finish) {
+    if (leaves_room(at, kReach * size.maxCoeff())) out_.mesh(file, at, yaw, size, finish);
+  };
   out_.model("stones");
   for (int i = 0; i < things; ++i) {
     const Vector3d at(random_.uniform(kWest, kEast), random_.uniform(-half_width, half_width),
                       random_.uniform(0, 0.1));
-    out_.mesh(fmt::format("stone{}.obj", static_cast<int>(kStones * random_.uniform())), at,
-              random_.uniform(0, 2 * kPi), random_.uniform(0.15, 0.7) * Vector3d(1.2, 1, 0.7),
-              {"concrete", tint(0.6, 0.95), 0.6, 1.4});
+    lay(fmt::format("stone{}.obj", static_cast<int>(kStones * random_.uniform())), at,
+        random_.uniform(0, 2 * kPi), random_.uniform(0.15, 0.7) * Vector3d(1.2, 1, 0.7),
+        {"concrete", tint(0.6, 0.95), 0.6, 1.4});
   }
 }
 
