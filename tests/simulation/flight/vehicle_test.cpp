@@ -56,9 +56,16 @@ TEST(Vehicle, AGustPushesItAndItComesBack) {
   Vehicle vehicle({}, {0, 0, 2}, 0);
   Setpoint here;
   here.position = {0, 0, 2};
-  fly(vehicle, here, 3, {0, 5, 0});
-  EXPECT_GT(vehicle.state().position.y(), 0.05);
-  EXPECT_LT(vehicle.state().position.norm(), 3);
+  double farthest = 0;
+  for (int i = 0; i < 10; ++i) {
+    fly(vehicle, here, 0.2, {0, 5, 0});
+    farthest = std::max(farthest, vehicle.state().position.y());
+  }
+  EXPECT_GT(farthest, 0.05);
+  EXPECT_LT(farthest, 0.3);
+  // Wind that lasts does not keep it beside its place.
+  fly(vehicle, here, 5, {0, 5, 0});
+  EXPECT_LT((vehicle.state().position - here.position).norm(), 0.02);
   fly(vehicle, here, 8);
   EXPECT_LT((vehicle.state().position - here.position).norm(), 0.01);
 }

@@ -30,7 +30,7 @@ Vector3d shortened(const Vector3d& v, double most) {
 }  // namespace
 
 Status check(const VehicleModel& model) {
-  const std::array<OptionRange, 10> ranges = {{{"attitude_lag", model.attitude_lag, 0.01, 10},
+  const std::array<OptionRange, 11> ranges = {{{"attitude_lag", model.attitude_lag, 0.01, 10},
                                                {"rate_lag", model.rate_lag, 0.005, 10},
                                                {"thrust_lag", model.thrust_lag, 0.01, 10},
                                                {"drag", model.drag, 0, 10},
@@ -39,6 +39,7 @@ Status check(const VehicleModel& model) {
                                                {"thrust", model.thrust, model.gravity, 500},
                                                {"position_gain", model.position_gain, 0, 20},
                                                {"velocity_gain", model.velocity_gain, 0, 20},
+                                               {"integral_gain", model.integral_gain, 0, 20},
                                                {"gravity", model.gravity, above_zero, 100}}};
   return check_ranges(ranges);
 }
@@ -54,7 +55,7 @@ Vector3d Vehicle::asked_thrust(const Setpoint& setpoint, const KinematicState& b
   const Vector3d velocity =
       setpoint.velocity +
       shortened(model_.position_gain * (setpoint.position - believed.position), kMostCorrection);
-  Vector3d thrust = setpoint.acceleration + model_.velocity_gain * (velocity - believed.velocity) +
+  Vector3d thrust = setpoint.acceleration + steady_ + model_.velocity_gain * (velocity - believed.velocity) +
                     model_.drag * setpoint.velocity + model_.gravity * Vector3d::UnitZ();
   thrust.z() = std::max(thrust.z(), 0.3 * model_.gravity);
   const Vector3d level(thrust.x(), thrust.y(), 0);
@@ -64,6 +65,10 @@ Vector3d Vehicle::asked_thrust(const Setpoint& setpoint, const KinematicState& b
 
 void Vehicle::fly(const Setpoint& setpoint, const KinematicState& believed, const Vector3d& wind,
                   double step) {
+  constexpr double kMostOffset = 0.5;  // m: what is farther off has not been pushed there
+  constexpr double kMostSteady = 3;    // m/s^2
+  const Vector3d offset = shortened(setpoint.position - believed.position, kMostOffset);
+  steady_ = shortened(steady_ + step * model_.integral_gain * offset, kMostSteady);
   const Vector3d asked = asked_thrust(setpoint, believed);
   const Eigen::Quaterniond error = state_.R_world_body.conjugate() * attitude_of(asked, setpoint.yaw);
   const KinematicState before = state_;

@@ -21,6 +21,7 @@ struct VehicleModel {
   double thrust = 20;          ///< greatest per mass, m/s^2
   double position_gain = 1.5;  ///< velocity that an error of position asks for, 1/s
   double velocity_gain = 3;    ///< acceleration that an error of velocity asks for, 1/s
+  double integral_gain = 2;    ///< acceleration that an error of position asks for while it lasts, 1/s^3
   double gravity = 9.80665;    ///< m/s^2
 
   template <class Self, class Visitor>
@@ -34,6 +35,8 @@ struct VehicleModel {
     field("thrust", self.thrust, "greatest thrust per mass, m/s^2");
     field("position_gain", self.position_gain, "velocity that an error of position asks for, 1/s");
     field("velocity_gain", self.velocity_gain, "acceleration that an error of velocity asks for, 1/s");
+    field("integral_gain", self.integral_gain,
+          "acceleration that an error of position asks for while it lasts, 1/s^3");
     field("gravity", self.gravity, "m/s^2, downwards");
   }
 };
@@ -69,7 +72,8 @@ class Vehicle {
 
   VehicleModel model_;
   KinematicState state_;
-  double thrust_;  // along body z, per mass
+  Eigen::Vector3d steady_ = Eigen::Vector3d::Zero();  // m/s^2, against what has pushed it aside so far
+  double thrust_;                                     // along body z, per mass
 };
 
 }  // namespace pade::simulation
