@@ -124,5 +124,28 @@ TEST(LocalGuide, LeadsStraightWhereNothingStandsAndAroundAWall) {
   EXPECT_GT(guide.to_go({0, 0, 1.6}), 4 * 1.5 + 6 + 0.5);
 }
 
+/// A goal that something stands at, as the map has it, is flown to as near as one gets: it used to leave no way
+/// at all.
+TEST(LocalGuide, LeadsTowardAGoalThatIsBlocked) {
+  for (const double half : {0.2, 1.2}) {  // of what stands there, m
+    auto tree = std::make_unique<octomap::OcTree>(0.1);
+    const int reach = static_cast<int>(std::lround(half / 0.1));
+    for (int x = 30 - reach; x < 30 + reach; ++x) {
+      for (int y = -reach; y < reach; ++y) {
+        for (int z = 0; z < 40; ++z) tree->updateNode(voxel(x, y, z), true);
+      }
+    }
+    const auto map = mapping::OccupancyMap::create({}, std::move(tree));
+    LocalWindow window({6.4, 6.4, 1.6});
+    window.set(*mapping::MapView::of(*map), {0, 0, 1.6}, 0.4);
+    LocalGuide guide;
+    guide.set(window, {3, 0, 1.6}, {0.7, 2.8}, 1);
+    const double far = guide.to_go({0, 0, 1.6});
+    ASSERT_TRUE(std::isfinite(far)) << half;
+    EXPECT_LT(guide.to_go({1, 0, 1.6}), far - 1) << half;
+    EXPECT_LT(guide.to_go({0, 1, 1.6}), far + 2) << half;
+  }
+}
+
 }  // namespace
 }  // namespace pade::planning

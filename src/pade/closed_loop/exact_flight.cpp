@@ -95,7 +95,7 @@ std::vector<MotionState> ExactLoop::decide(double time, double effect) {
   const bool near_start = (then.position - task_.start).norm() < options_.known_start + kStartInSight;
   const auto known =
       near_start && options_.known_start > 0 ? view_->flown(start, options_.known_start) : view_;
-  window_.set(*known, then.position, planner_.radius(0));
+  window_.set(*known, then.position, planner_.radius());
   const planning::MapSpace space(known);
   const planning::LocalPlan& plan = planner_.plan(then, task_.goal, space, window_);
   watch_.add({time, plan.kind, plan.speed_limit, plan.free_reach, plan.valid});

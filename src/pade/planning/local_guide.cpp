@@ -16,6 +16,7 @@ constexpr double kPerMetre = 100;    // costs count centimetres
 constexpr std::uint8_t kSeen = 10;   // prices, in tenths
 constexpr std::uint8_t kTight = 13;  // something is near
 constexpr std::uint8_t kUnseen = 15;
+constexpr double kAbout = 3;  // from a goal that is not to be reached, m
 constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint32_t kFarthest = 4000;  // a way that is longer by 40 m is none
 
@@ -83,18 +84,43 @@ void LocalGuide::offer(Index cell, std::uint32_t cost) {
   queue_[cost].push_back(cell);
 }
 
+/// The cells that count as the goal; or, where all of them are blocked, those nearest to it. False if none is
+/// passable.
+bool LocalGuide::start_about(const Vector3d& goal, double arrival) {
+  constexpr double kBeyond = 2;  // a metre that will be missing costs so many
+  const double there = std::max(arrival, kCell);
+  bool found = false;
+  for (const double within : {there, kAbout}) {
+    std::size_t cell = 0;
+    for (int z = 0; z < size_.z(); ++z) {
+      for (int y = 0; y < size_.y(); ++y) {
+        for (int x = 0; x < size_.x(); ++x, ++cell) {
+          const double away = (centre_of(x, y, z) - goal).head<2>().norm();
+          if (away > within || price_[cell] == 0) continue;
+          const double cost = away + (kBeyond - 1) * std::max(away - there, 0.0);
+          offer(static_cast<Index>(cell), static_cast<std::uint32_t>(std::lround(cost * kPerMetre)));
+          found = true;
+        }
+      }
+    }
+    if (found) return true;
+  }
+  return false;
+}
+
 /// The goal, where the window holds it; else all cells of its sides.
-void LocalGuide::start_from(const Vector3d& goal) {
+void LocalGuide::start_from(const Vector3d& goal, double arrival) {
   const Vector3d at = (goal - corner_).cwiseQuotient(Vector3d(kCell, kCell, kLevel));
   const Vector3i in = at.array().floor().cast<int>();
   least_ = 0;
+  const bool holds = in.x() >= 0 && in.y() >= 0 && in.x() < size_.x() && in.y() < size_.y();
+  if (!holds || !start_about(goal, arrival)) start_from_sides(goal);
+}
+
+void LocalGuide::start_from_sides(const Vector3d& goal) {
   const auto index = [&](int x, int y, int z) {
     return static_cast<Index>((z * size_.y() + y) * size_.x() + x);
   };
-  if (in.x() >= 0 && in.y() >= 0 && in.x() < size_.x() && in.y() < size_.y()) {
-    for (int z = 0; z < size_.z(); ++z) offer(index(in.x(), in.y(), z), 0);
-    return;
-  }
   const auto for_sides = [&](const auto& visit) {
     for (int z = 0; z < size_.z(); ++z) {
       for (int y = 0; y < size_.y(); ++y) {
@@ -129,10 +155,11 @@ void LocalGuide::walk() {
   }
 }
 
-void LocalGuide::set(const LocalWindow& window, const Vector3d& goal, const Heights& heights) {
+void LocalGuide::set(const LocalWindow& window, const Vector3d& goal, const Heights& heights,
+                     double arrival) {
   lay_out(window, heights);
   price(window);
-  start_from(goal);
+  start_from(goal, arrival);
   walk();
 }
 

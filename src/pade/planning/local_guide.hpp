@@ -19,8 +19,11 @@ class LocalGuide {
     double lowest;
     double highest;
   };
-  /// Lengths of ways to `goal` (world, m) from all cells of the window.
-  void set(const LocalWindow& window, const Eigen::Vector3d& goal, const Heights& heights);
+  /// Lengths of ways to `goal` (world, m) from all cells of the window. Where something stands at the goal,
+  /// of the ways to the places nearest to it.
+  /// @param arrival  horizontally as near to the goal is there, m
+  void set(const LocalWindow& window, const Eigen::Vector3d& goal, const Heights& heights,
+           double arrival = 0);
 
   /// Length of the way from a point, m, unseen parts counted more; infinity where none is known, and beyond
   /// the window.
@@ -30,7 +33,9 @@ class LocalGuide {
   using Index = std::uint32_t;
   void lay_out(const LocalWindow& window, const Heights& heights);
   void price(const LocalWindow& window);
-  void start_from(const Eigen::Vector3d& goal);
+  void start_from(const Eigen::Vector3d& goal, double arrival);
+  bool start_about(const Eigen::Vector3d& goal, double arrival);
+  void start_from_sides(const Eigen::Vector3d& goal);
   void offer(Index cell, std::uint32_t cost);
   void walk();
   [[nodiscard]] double at(int x, int y, int z) const;

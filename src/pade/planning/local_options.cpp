@@ -7,11 +7,12 @@
 namespace pade::planning {
 
 Status check(const VehicleLimits& limits) {
-  const std::array<OptionRange, 6> ranges = {{{"radius", limits.radius, above_zero, 10},
+  const std::array<OptionRange, 7> ranges = {{{"radius", limits.radius, above_zero, 10},
                                               {"speed", limits.speed, above_zero, 50},
                                               {"acceleration", limits.acceleration, 0.1, 50},
                                               {"pick_up", limits.pick_up, 0.1, 50},
                                               {"latency", limits.latency, 0, 10},
+                                              {"overshoot", limits.overshoot, 0, 1},
                                               {"nose_angle", limits.nose_angle, 0.01, 3.2}}};
   if (const Status s = check_ranges(ranges); !s) return s;
   const std::array<OptionRange, 2> heights = {

@@ -13,6 +13,7 @@ struct VehicleLimits {
   double acceleration = 3;  ///< of braking, m/s^2
   double pick_up = 2;     ///< of speeding up and turning, m/s^2: the less the vehicle tilts, the more it sees
   double latency = 0.35;  ///< from the moment of an image until what it shows changes the motion, s
+  double overshoot = 0.05;    ///< it comes to rest so far beyond its planned standstill, m for each m/s
   double nose_angle = 0.262;  ///< the velocity is never farther from the nose than this, rad
   double lowest = 0.7;        ///< height of its centre in the world, m
   double highest = 2.8;       ///< and the greatest, m
@@ -24,6 +25,8 @@ struct VehicleLimits {
     field("acceleration", self.acceleration, "of braking, m/s^2");
     field("pick_up", self.pick_up, "of speeding up and turning, m/s^2");
     field("latency", self.latency, "from an image until what it shows changes the motion, s");
+    field("overshoot", self.overshoot,
+          "it comes to rest so far beyond its planned standstill, m for each m/s of speed");
     field("nose_angle", self.nose_angle, "the velocity is never farther from the nose than this, rad");
     field("lowest", self.lowest, "least height of its centre in the world, m");
     field("highest", self.highest, "greatest height of its centre in the world, m");

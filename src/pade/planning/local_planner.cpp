@@ -18,6 +18,11 @@ constexpr double kSwingRoom = 0.2;                // to each side, m
 constexpr double kPatience = 0.6;                 // s of standing before a hop
 constexpr double kPatienceInFlight = 1.5;         // s without progress
 constexpr double kProgress = 0.3;                 // m
+constexpr double kSetback = 1;                    // m: the way is longer than it seemed
+constexpr int kMostSetbacks = 3;                  // that are no circling
+constexpr double kLongestTurn = 4;                // s on the spot
+constexpr double kYield = 0.05;                   // m less than the vehicle, where something is as near
+constexpr double kJoint = 0.05;                   // m; what begins farther off is no rest of a plan
 constexpr double kHopSpeed = 0.4;                 // m/s
 constexpr double kStanding = 0.05;                // m/s
 constexpr double kCrawl = 0.25;                   // slower motion may have any direction, m/s
@@ -38,12 +43,42 @@ Result<LocalPlanner> LocalPlanner::create(const LocalPlannerOptions& options) {
   return LocalPlanner(options);
 }
 
+/// Where the vehicle stands nearer to something than its ball is large, nothing that starts there would be
+/// free: then the ball is what is clear there, down to a little less than the vehicle.
+void LocalPlanner::begin(const Place& place, const PlaceDoubt& doubt) {
+  committed_.swap(plan_.motion);
+  plan_.valid = 0;
+  plan_.peering = false;
+  plan_.kind = PlanKind::committed;
+  plan_.command = {};
+  wanted_ = radius(doubt);
+  near_ = clear_radius(place);
+  plan_.radius = std::max(near_, std::min(wanted_, options_.vehicle.radius - kYield));
+}
+
+/// Of the largest ball up to the wanted one that touches nothing where the plan begins, to some millimetres.
+double LocalPlanner::clear_radius(const Place& place) {
+  path_.assign(1, place.from.position);
+  const auto is_clear = [&](double radius) {
+    return place.space.clear_length(path_, radius, options_.unknown_is_free) == kInfinity;
+  };
+  constexpr double kLeast = 0.02;  // less is within something
+  if (is_clear(wanted_)) return wanted_;
+  double low = kLeast;
+  double high = wanted_;
+  for (int i = 0; i < 7; ++i) {
+    const double middle = 0.5 * (low + high);
+    (is_clear(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
 /// Straight on: along the velocity, or the nose where it stands.
-double LocalPlanner::free_reach(const Task& task) {
-  const double speed = task.from.velocity.norm();
-  const Vector3d along = speed > kCrawl ? Vector3d(task.from.velocity / speed) : nose(task.from.yaw);
-  path_ = {task.from.position, task.from.position + options_.reach * along};
-  return std::min(task.space.clear_length(path_, plan_.radius, options_.unknown_is_free), options_.reach);
+double LocalPlanner::free_reach(const Place& place) {
+  const double speed = place.from.velocity.norm();
+  const Vector3d along = speed > kCrawl ? Vector3d(place.from.velocity / speed) : nose(place.from.yaw);
+  path_ = {place.from.position, place.from.position + options_.reach * along};
+  return std::min(place.space.clear_length(path_, plan_.radius, options_.unknown_is_free), options_.reach);
 }
 
 /// Something straight ahead has not been seen, nothing stands before it, and there is room to the sides.
@@ -61,17 +96,50 @@ bool LocalPlanner::is_blind_ahead(const Task& task) const {
   return false;
 }
 
-bool LocalPlanner::is_valid(const Task& task, const std::vector<MotionState>& motion, bool any_way) {
+bool LocalPlanner::is_in_bounds(const Place& place, const std::vector<MotionState>& motion,
+                                bool any_way) const {
   const VehicleLimits& limits = options_.vehicle;
-  const double low = std::min(limits.lowest, task.from.position.z() - 1e-6);
-  const double high = std::max(limits.highest, task.from.position.z() + 1e-6);
+  const double low = std::min(limits.lowest, place.from.position.z() - 1e-6);
+  const double high = std::max(limits.highest, place.from.position.z() + 1e-6);
+  return std::all_of(motion.begin(), motion.end(), [&](const MotionState& state) {
+    return state.position.z() >= low && state.position.z() <= high &&
+           (any_way || follows_the_nose(state, limits.nose_angle));
+  });
+}
+
+/// How far a ball gets along a motion and what it overshoots its standstill by; infinity: to its end.
+double LocalPlanner::clear_length(const Place& place, const std::vector<MotionState>& motion, double radius) {
+  double fastest = 0;
+  Vector3d last = Vector3d::Zero();  // direction in which it brakes
   path_.clear();
   for (const MotionState& state : motion) {
-    if (state.position.z() < low || state.position.z() > high) return false;
-    if (!any_way && !follows_the_nose(state, limits.nose_angle)) return false;
     path_.push_back(state.position);
+    const double speed = state.velocity.norm();
+    fastest = std::max(fastest, speed);
+    if (speed > kStanding) last = state.velocity / speed;
   }
-  return task.space.clear_length(path_, plan_.radius, options_.unknown_is_free) == kInfinity;
+  path_.push_back(path_.back() + options_.vehicle.overshoot * fastest * last);
+  return place.space.clear_length(path_, radius, options_.unknown_is_free);
+}
+
+/// How long a motion goes on before it touches something, s from now; infinity: it never does.
+double LocalPlanner::clear_time(const Place& place, const std::vector<MotionState>& motion) {
+  double left = clear_length(place, motion, near_);
+  if (left == kInfinity) return kInfinity;
+  for (std::size_t i = 0; i + 1 < motion.size(); ++i) {
+    const double piece = (motion[i + 1].position - motion[i].position).norm();
+    const double time = motion[i].time - motion.front().time;
+    if (left < piece) return time + left / piece * (motion[i + 1].time - motion[i].time);
+    left -= piece;
+  }
+  return motion.back().time - motion.front().time;
+}
+
+/// Where it began too near to something, a motion has to end clear of it.
+bool LocalPlanner::gets_clear(const Place& place, const std::vector<MotionState>& motion) {
+  if (near_ >= wanted_) return true;
+  path_.assign(1, motion.back().position);
+  return place.space.clear_length(path_, wanted_, options_.unknown_is_free) == kInfinity;
 }
 
 /// Length of the way that is left after the horizon, looked at twice so that the nose counts.
@@ -94,7 +162,9 @@ void LocalPlanner::choose_primitive(const Task& task) {
         const double most = speed * std::tan(limits.nose_angle);  // the velocity stays near the nose
         const MotionCommand command{speed, 0, std::clamp(climb, -most, most), yaw_rate, swing};
         foretell(task.from, command, hold, options_.step, limits, candidate_);
-        if (!is_valid(task, candidate_, plan_.peering)) continue;
+        if (!is_in_bounds(task, candidate_, plan_.peering) ||
+            clear_length(task, candidate_, plan_.radius) != kInfinity || !gets_clear(task, candidate_))
+          continue;
         ++plan_.valid;
         const double value = score(candidate_) + 0.02 * std::abs(yaw_rate) + 0.1 * std::abs(climb);
         if (value < best) {
@@ -108,17 +178,28 @@ void LocalPlanner::choose_primitive(const Task& task) {
   }
 }
 
-/// What is left of the last plan, which was free when it was made; or braking at once, if that is free now
-/// and the rest of the plan is not.
-void LocalPlanner::commit(const Task& task) {
-  plan_.kind = PlanKind::committed;
-  plan_.command = {};
-  foretell(task.from, {}, 0, options_.step, options_.vehicle, candidate_);
-  plan_.motion.assign(1, task.from);
+/// What is left of the last plan. False where that does not begin here.
+bool LocalPlanner::take_rest(const MotionState& from) {
+  plan_.motion.assign(1, from);
   for (const MotionState& state : committed_) {
-    if (state.time > task.from.time + 1e-6) plan_.motion.push_back(state);
+    if (state.time > from.time + 1e-6) plan_.motion.push_back(state);
   }
-  if (!is_valid(task, plan_.motion, true) && is_valid(task, candidate_, true)) plan_.motion = candidate_;
+  return plan_.motion.size() > 1 &&
+         (state_at(committed_, from.time).position - from.position).norm() < kJoint;
+}
+
+/// A standstill that is free: what is left of the last plan, which was free when it was made, or braking at
+/// once. Where neither is, whatever stays clear for longer.
+void LocalPlanner::commit(const Place& place, bool prefers_rest) {
+  foretell(place.from, {}, 0, options_.step, options_.vehicle, candidate_);
+  if (!take_rest(place.from)) {
+    plan_.motion = candidate_;
+    return;
+  }
+  const double rest = clear_time(place, plan_.motion);
+  const double brake = clear_time(place, candidate_);
+  if (prefers_rest ? rest == kInfinity : rest > brake) return;
+  if (brake >= rest) plan_.motion = candidate_;
 }
 
 /// The direction in which the way to the goal is shortest.
@@ -142,12 +223,12 @@ double LocalPlanner::best_heading(const Task& task) const {
 
 bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command) {
   foretell(task.from, command, options_.horizon, options_.step, options_.vehicle, candidate_);
-  if (!is_valid(task, candidate_, true)) return false;
+  if (!is_in_bounds(task, candidate_, true) || clear_length(task, candidate_, near_) != kInfinity) return false;
   plan_.kind = PlanKind::recovering;
   plan_.command = command;
   plan_.motion.swap(candidate_);
   hop_ends_ = plan_.motion.back().time;
-  standing_since_ = -1;
+  standing_since_ = turning_since_ = -1;
   return true;
 }
 
@@ -170,74 +251,97 @@ bool LocalPlanner::hop(const Task& task) {
 /// A hop is flown to its end, as long as it is free.
 bool LocalPlanner::goes_on_hopping(const Task& task) {
   if (task.from.time >= hop_ends_ - 1e-6) return false;
-  commit(task);
+  commit(task, true);
   plan_.kind = PlanKind::recovering;
   since_ = task.from.time;
   return true;
 }
 
-/// For a while neither motion nor what was seen has brought the goal nearer.
+/// For a while neither motion nor what was seen has brought the goal nearer. A way that turns out to be
+/// longer, since something has come into sight or the goal has moved, is a new beginning, some times.
 bool LocalPlanner::gets_nowhere(const Task& task) {
   const double to_go = guide_.to_go(task.from.position);
-  if (least_to_go_ < 0 || to_go < least_to_go_ - kProgress) {
+  const bool first = least_to_go_ < 0;
+  const bool longer = std::isfinite(to_go) && to_go > least_to_go_ + kSetback && setbacks_ < kMostSetbacks;
+  if (first || to_go < nearest_) {
+    nearest_ = to_go;
+    setbacks_ = 0;
+  }
+  if (first || longer || to_go < least_to_go_ - kProgress) {
+    setbacks_ += !first && longer ? 1 : 0;
     least_to_go_ = to_go;
     since_ = task.from.time;
   }
   if (task.from.time - since_ < kPatienceInFlight) return false;
-  least_to_go_ = to_go;
+  least_to_go_ = nearest_ = to_go;
+  setbacks_ = 0;
   since_ = task.from.time;
+  return true;
+}
+
+/// On the spot, to where the way goes on. False if it looks there, or has turned for long.
+bool LocalPlanner::turn(const Task& task) {
+  const double angle = wrapped(best_heading(task) - task.from.yaw);
+  constexpr double kAligned = 0.15;
+  constexpr double kTurnRate = 1;  // rad/s
+  if (std::abs(angle) <= kAligned) return false;
+  if (turning_since_ < 0) turning_since_ = task.from.time;
+  if (task.from.time - turning_since_ > kLongestTurn) return false;
+  plan_.kind = PlanKind::recovering;
+  plan_.command = {0, 0, 0, std::clamp(2 * angle, -kTurnRate, kTurnRate), 0};
+  foretell(task.from, plan_.command, std::min(std::abs(angle) / kTurnRate, options_.horizon), options_.step,
+           options_.vehicle, plan_.motion);
+  standing_since_ = task.from.time;
   return true;
 }
 
 /// Standing: first the nose turns to where the way goes on, then the vehicle hops to the sides, back, up and
 /// down, wherever it is known to be free, to see past what hides the way.
 void LocalPlanner::recover(const Task& task) {
-  const double turn = wrapped(best_heading(task) - task.from.yaw);
-  constexpr double kAligned = 0.15;
-  constexpr double kTurnRate = 1;  // rad/s
-  if (std::abs(turn) > kAligned) {
-    plan_.kind = PlanKind::recovering;
-    plan_.command = {0, 0, 0, std::clamp(2 * turn, -kTurnRate, kTurnRate), 0};
-    foretell(task.from, plan_.command, std::min(std::abs(turn) / kTurnRate, options_.horizon), options_.step,
-             options_.vehicle, plan_.motion);
-    standing_since_ = task.from.time;
-    return;
-  }
+  if (turn(task)) return;
   if (standing_since_ < 0) standing_since_ = task.from.time;
   if (task.from.time - standing_since_ < kPatience) return;
-  hop(task);
+  if (!hop(task)) turning_since_ = -1;
+}
+
+const LocalPlan& LocalPlanner::stop(const MotionState& from, const FreeSpace& space,
+                                    const PlaceDoubt& doubt) {
+  const Place place{from, space};
+  begin(place, doubt);
+  plan_.speed_limit = plan_.free_reach = 0;
+  commit(place, false);
+  since_ = from.time;
+  hop_ends_ = standing_since_ = turning_since_ = -1;
+  return plan_;
 }
 
 const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& goal, const FreeSpace& space,
-                                    const LocalWindow& window, double sigma) {
-  const Task task{from, goal, space, window};
-  committed_.swap(plan_.motion);
-  plan_.valid = 0;
-  plan_.peering = false;
-  plan_.radius = radius(sigma);
+                                    const LocalWindow& window, const PlaceDoubt& doubt) {
+  const Task task{{from, space}, goal, window};
+  begin(task, doubt);
   plan_.free_reach = free_reach(task);
-  const double sure = plan_.free_reach - 3 * sigma;
+  const double sure = plan_.free_reach - 3 * doubt.sigma;
   plan_.speed_limit =
       std::clamp(governed_speed(sure, options_.vehicle), options_.slowest, options_.vehicle.speed);
-  if ((goal - from.position).head<2>().norm() < options_.arrival) {
+  // A little nearer than whoever asks whether it has arrived, and may see it a little farther off.
+  constexpr double kWellWithin = 0.8;
+  if ((goal - from.position).head<2>().norm() < kWellWithin * options_.arrival) {
     plan_.kind = PlanKind::arrived;
-    plan_.command = {};
-    foretell(from, {}, 0, options_.step, options_.vehicle, plan_.motion);
+    commit(task, false);
     return plan_;
   }
-  guide_.set(window, goal, {options_.vehicle.lowest, options_.vehicle.highest});
+  guide_.set(window, goal, {options_.vehicle.lowest, options_.vehicle.highest}, options_.arrival);
   const bool stuck = gets_nowhere(task);
   if (goes_on_hopping(task)) return plan_;
-  plan_.kind = PlanKind::committed;
   plan_.peering = options_.peering && is_blind_ahead(task);
   choose_primitive(task);
   if (plan_.kind != PlanKind::flying) {
     plan_.peering = false;
-    commit(task);
+    commit(task, true);
     if (from.velocity.norm() < kStanding) recover(task);
     return plan_;
   }
-  standing_since_ = -1;
+  standing_since_ = turning_since_ = -1;
   if (stuck) hop(task);
   return plan_;
 }

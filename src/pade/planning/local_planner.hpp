@@ -31,9 +31,15 @@ struct LocalPlan {
   std::vector<MotionState> motion;  ///< from the state that was given to the standstill
   double speed_limit = 0;           ///< what the governor allows, m/s
   double free_reach = 0;            ///< that the ball gets straight ahead in known-free space, m
-  double radius = 0;                ///< of the ball that was looked for: vehicle, margin and sigma, m
+  double radius = 0;                ///< of the ball that was looked for: vehicle, margin and doubt, m
   int valid = 0;                    ///< primitives that were valid
   bool peering = false;             ///< it swings to see what lies straight ahead
+};
+
+/// How far the vehicle may be from where the plan has it. Both make the ball larger that has to fit.
+struct PlaceDoubt {
+  double sigma = 0;   ///< of its place in the map, m; makes it slower as well
+  double offset = 0;  ///< from its plan, m
 };
 
 /// Deterministic: the same calls, the same bits. Not thread-safe.
@@ -46,32 +52,46 @@ class LocalPlanner {
   /// @param goal    world, m
   /// @param space   what is free
   /// @param window  the same map about the vehicle: where obstacles are, to find a way around
-  /// @param sigma   of the position, m: the margin grows with it
   /// @return valid until the next call
   const LocalPlan& plan(const MotionState& from, const Eigen::Vector3d& goal, const FreeSpace& space,
-                        const LocalWindow& window, double sigma = 0);
+                        const LocalWindow& window, const PlaceDoubt& doubt = {});
+
+  /// A standstill, for who sees nothing any more: braking at once, or what is left of the last plan where
+  /// only that is free. Arguments and result as for plan().
+  const LocalPlan& stop(const MotionState& from, const FreeSpace& space, const PlaceDoubt& doubt = {});
 
   /// What a ball that the planner flies is grown to, m.
-  [[nodiscard]] double radius(double sigma) const {
-    return options_.vehicle.radius + options_.margin + options_.margin_sigmas * sigma;
+  [[nodiscard]] double radius(const PlaceDoubt& doubt = {}) const {
+    return options_.vehicle.radius + options_.margin + options_.margin_sigmas * doubt.sigma + doubt.offset;
   }
   [[nodiscard]] const LocalPlannerOptions& options() const { return options_; }
 
  private:
   explicit LocalPlanner(const LocalPlannerOptions& options) : options_(options) {}
-  struct Task {
+  struct Place {
     const MotionState& from;
-    const Eigen::Vector3d& goal;
     const FreeSpace& space;
+  };
+  struct Task : Place {
+    const Eigen::Vector3d& goal;
     const LocalWindow& window;
   };
-  [[nodiscard]] double free_reach(const Task& task);
+  void begin(const Place& place, const PlaceDoubt& doubt);
+  [[nodiscard]] double clear_radius(const Place& place);
+  [[nodiscard]] double free_reach(const Place& place);
   [[nodiscard]] bool is_blind_ahead(const Task& task) const;
-  [[nodiscard]] bool is_valid(const Task& task, const std::vector<MotionState>& motion, bool any_way);
+  [[nodiscard]] bool is_in_bounds(const Place& place, const std::vector<MotionState>& motion,
+                                  bool any_way) const;
+  [[nodiscard]] double clear_length(const Place& place, const std::vector<MotionState>& motion,
+                                    double radius);
+  [[nodiscard]] double clear_time(const Place& place, const std::vector<MotionState>& motion);
+  [[nodiscard]] bool gets_clear(const Place& place, const std::vector<MotionState>& motion);
   [[nodiscard]] double score(const std::vector<MotionState>& motion) const;
   void choose_primitive(const Task& task);
-  void commit(const Task& task);
+  bool take_rest(const MotionState& from);
+  void commit(const Place& place, bool prefers_rest);
   void recover(const Task& task);
+  bool turn(const Task& task);
   [[nodiscard]] double best_heading(const Task& task) const;
   bool try_hop(const Task& task, const MotionCommand& command);
   bool hop(const Task& task);
@@ -83,11 +103,16 @@ class LocalPlanner {
   LocalPlan plan_;
   std::vector<MotionState> candidate_, committed_;
   std::vector<Eigen::Vector3d> path_;
+  double wanted_ = 0;           // radius that is looked for, m
+  double near_ = 0;             // what of it is clear where the plan begins, m
   double standing_since_ = -1;  // s; negative = it moves
+  double turning_since_ = -1;   // s; negative = it does not turn on the spot
   int hops_ = 0;
   double hop_ends_ = -1;     // s; of the hop that is being flown
   double least_to_go_ = -1;  // the shortest way that was left so far, m; negative = not known
-  double since_ = 0;         // when that was, s
+  double nearest_ = 0;       // the shortest of all since it last got nowhere, m
+  int setbacks_ = 0;         // since then: how often the way turned out to be longer
+  double since_ = 0;         // when least_to_go_ was, s
 };
 
 }  // namespace pade::planning
