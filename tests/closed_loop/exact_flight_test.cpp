@@ -42,6 +42,13 @@ TEST(ExactFlight, GoesAroundColumnsThatStandInItsWay) {
   }
 }
 
+/// Nearer to the goal than 1 m is there, and may be free where the goal is not.
+TEST(ExactFlight, ArrivesBesideAGoalThatSomethingStandsAt) {
+  const FlightRecord record = flown(columns({{9, 0}}), 9, quick());
+  EXPECT_EQ(record.outcome, Outcome::arrived);
+  EXPECT_GT(record.least_clearance, 0.35);
+}
+
 TEST(ExactFlight, StandsStillBeforeAWallWithoutAWayAndTouchesNothing) {
   std::vector<Eigen::Vector2d> wall;
   for (double angle = 0; angle < 6.28; angle += 0.1)
@@ -51,6 +58,27 @@ TEST(ExactFlight, StandsStillBeforeAWallWithoutAWayAndTouchesNothing) {
   const FlightRecord record = flown(columns(wall), 16, options);
   EXPECT_EQ(record.outcome, Outcome::timed_out);
   EXPECT_GT(record.least_clearance, 0.35);
+}
+
+/// The climb is no part of the way: not its length, not its end, which is a standstill, not its time.
+TEST(FlightWatch, MeasuresTheWayAndNotTheClimb) {
+  const Place place = columns({});
+  FlightWatch watch({place.scene, place.surface, {0, 0, 1.6}, {20, 0, 1.6}}, 0.35);
+  for (int i = 0; i <= 800; ++i) {
+    planning::MotionState state;
+    state.time = i / 100.0;
+    const bool climbs = state.time < 2;
+    const bool rests = !climbs && state.time < 3;
+    state.position = {climbs || rests ? 0 : 2 * (state.time - 3), 0, climbs ? 0.4 + 0.6 * state.time : 1.6};
+    state.velocity = {climbs || rests ? 0.0 : 2, 0, climbs ? 0.6 : 0};
+    EXPECT_TRUE(watch.look(state));
+  }
+  const FlightRecord record = watch.finished(Outcome::timed_out, 2.5);
+  EXPECT_EQ(record.stops, 0);
+  EXPECT_FALSE(record.stands);
+  EXPECT_NEAR(record.length, 10, 0.03);
+  EXPECT_NEAR(record.goal_velocity, 10 / 5.5, 0.01);
+  EXPECT_DOUBLE_EQ(record.duration, 8);
 }
 
 TEST(ExactFlight, TheSameFlightHasTheSameBits) {

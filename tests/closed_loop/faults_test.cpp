@@ -1,6 +1,8 @@
 // What goes wrong on purpose goes wrong as it should.
 #include "pade/closed_loop/faults.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -67,6 +69,42 @@ TEST(Faults, OthersLeaveTheWorldAsItIs) {
   const auto built = built_for(Fault::gust, world_of(columns({{5, 3}}), {25, 0, 1.6}));
   ASSERT_TRUE(built.ok());
   EXPECT_EQ(built->scene.world().visuals.size(), 2U);
+}
+
+TEST(Faults, OneFrameInTenIsDroppedAndSomeInARow) {
+  constexpr int kFrames = 20000;
+  int dropped = 0;
+  int run = 0;
+  std::array<int, 4> runs{};
+  for (int i = 0; i < kFrames; ++i) {
+    EXPECT_EQ(is_dropped(7, i), is_dropped(7, i));
+    run = is_dropped(7, i) ? run + 1 : 0;
+    dropped += run > 0 ? 1 : 0;
+    ++runs[static_cast<std::size_t>(std::min(run, 3))];
+  }
+  EXPECT_NEAR(dropped, kFrames / 10, 200);
+  EXPECT_GT(runs[2], 200);
+  EXPECT_GT(runs[3], 50);
+  int same = 0;
+  for (int i = 0; i < 1000; ++i) same += is_dropped(7, i) == is_dropped(8, i) ? 1 : 0;
+  EXPECT_LT(same, 900);
+}
+
+/// A flight that ends before its fault has begun says nothing about it.
+TEST(Faults, HowLongAFlightWasUnderThem) {
+  FaultOptions fault;
+  EXPECT_EQ(fault.seconds_of(20).under, 0);
+  fault.kind = Fault::gust;
+  EXPECT_LE(fault.from, 3);  // 25 m take 15 s
+  EXPECT_EQ(fault.seconds_of(2).under, 0);
+  EXPECT_NEAR(fault.seconds_of(8).under, 8 - fault.from, 1e-12);
+  EXPECT_NEAR(fault.seconds_of(15).under, 10, 1e-12);
+  EXPECT_NEAR(fault.seconds_of(15).after, 5 - fault.from, 1e-12);
+  fault.kind = Fault::late_stamps;
+  EXPECT_EQ(fault.seconds_of(15).under, 15);
+  fault.kind = Fault::crossing;
+  EXPECT_EQ(fault.seconds_of(3).under, 0);
+  EXPECT_GT(fault.seconds_of(15).under, 1);
 }
 
 TEST(PasserBy, CrossesTheWayWhereAndWhenItIsTold) {

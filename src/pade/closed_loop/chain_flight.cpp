@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <deque>
 #include <optional>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "pade/closed_loop/passer_by.hpp"
@@ -26,6 +28,7 @@ constexpr double kLookAhead = 0.02;   // s, over which a plan's acceleration is 
 constexpr double kClimbSpeed = 0.6;   // m/s
 constexpr double kAtTheGoal = 5;      // m from the true goal: what single-point GNSS can promise
 constexpr double kLost = 0.4;         // m from the plan: then it is made anew from where the vehicle is
+constexpr double kRecent = 3;         // s of the own track that are known to be free
 
 double processor_seconds() {
   timespec now{};
@@ -93,8 +96,10 @@ class ChainLoop {
   bool place(Time stamp, Pose& pose, Matrix6d& covariance);
   [[nodiscard]] std::optional<Vector3d> rate(Time stamp);
   void correct_stamps();
-  void anchor(Time stamp);
+  void anchor(Time stamp, const Pose& T_map_camera);
   [[nodiscard]] MotionState start_of_plan(double effect) const;
+  [[nodiscard]] std::shared_ptr<const mapping::MapView> known_about(const Vector3d& place);
+  [[nodiscard]] planning::PlaceDoubt doubt();
   std::vector<MotionState> decide(double effect);
   bool fly_until(int tick);
   void look_at_passer_by();
@@ -126,6 +131,8 @@ class ChainLoop {
   double stamp_correction_ = 0;                // s, of what the camera says
   Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
   double last_depth_ = 0;
+  double offset_ = 0;                            // from the plan, the greatest of late, m
+  std::deque<std::pair<double, Vector3d>> own_;  // believed places of the last seconds, map
   cv::Mat frozen_, image_;
   const MapperUpdate* update_ = nullptr;
   std::vector<MotionState> motion_;
@@ -211,11 +218,11 @@ std::optional<Vector3d> ChainLoop::rate(Time stamp) {
   return T_body_camera_.rotation.conjugate() * turned / NavigatedVehicle::step;
 }
 
-/// Where the filter's worlds lie in the map's, by the frame that the mapper has just placed.
-void ChainLoop::anchor(Time stamp) {
+/// Where the filter's worlds lie in the map's, by a frame's pose there.
+void ChainLoop::anchor(Time stamp, const Pose& T_map_camera) {
   const auto known = vehicle_.navigator().absolute_pose(stamp);
   if (known.answer != navigation::Answer::valid) return;
-  const Pose T_map_body = mapper_.T_world_camera() * T_body_camera_.inverse();
+  const Pose T_map_body = T_map_camera * T_body_camera_.inverse();
   T_map_smooth_ = T_map_body * known.T_smooth_body.inverse();
   T_map_world_ = T_map_body * known.T_world_body.inverse();
 }
@@ -239,6 +246,8 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
     view_ = view_->after(mapper_.map(), update.change);  // free space may be forgotten
     last_ = {stamp, pose};                               // the chain goes on
     since_taken_ = covariance;
+    // It holds its place by the motions since, which do not follow the wander of the satellites' positions.
+    anchor(stamp, pose);
     return;
   }
   if (last_) {
@@ -250,7 +259,7 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
   skipped_.clear();
   last_ = {stamp, pose};
   update_ = &update;
-  anchor(stamp);
+  anchor(stamp, mapper_.T_world_camera());
   if (update.outcome != MapperUpdate::Outcome::mapped) return;
   last_depth_ = now();
   out.views = update.views;
@@ -283,6 +292,28 @@ MotionState ChainLoop::start_of_plan(double effect) const {
   return planned;
 }
 
+/// The map, and what no camera has seen and is free: the climb, and where the vehicle itself has been.
+std::shared_ptr<const mapping::MapView> ChainLoop::known_about(const Vector3d& place) {
+  auto known = view_;
+  const std::array start = {ground_, map_start_};
+  const bool near_start = (place - map_start_).norm() < options_.known_start + kStartInSight;
+  if (near_start && options_.known_start > 0) known = known->flown(start, options_.known_start);
+  own_.emplace_back(now(), vehicle_.believed().translation);
+  while (now() - own_.front().first > kRecent) own_.pop_front();
+  std::vector<Vector3d> track;
+  for (const auto& [time, at] : own_) track.push_back(at);
+  return known->flown(track, options_.planner.vehicle.radius);
+}
+
+/// The whole way that it is beside its plan, for a while; and how sure the motion since the last image is.
+planning::PlaceDoubt ChainLoop::doubt() {
+  constexpr double kFades = 0.9;  // a frame
+  offset_ = std::max(kFades * offset_, record_.frames.back().tracking);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(since_taken_.topLeftCorner<3, 3>(),
+                                                              Eigen::EigenvaluesOnly);
+  return {std::sqrt(std::max(spread.eigenvalues().maxCoeff(), 0.0)), offset_};
+}
+
 std::vector<MotionState> ChainLoop::decide(double effect) {
   const double time = now();
   ChainFrame& frame = record_.frames.back();
@@ -293,21 +324,17 @@ std::vector<MotionState> ChainLoop::decide(double effect) {
     return motion_;
   }
   const MotionState from = start_of_plan(effect);
+  const planning::PlaceDoubt doubt = this->doubt();
+  const auto known = known_about(from.position);
+  const planning::MapSpace space(known);
   frame.blind = time - last_depth_ > options_.blind_after;
   if (frame.blind) {
-    std::vector<MotionState> stop;
-    planning::foretell(from, {}, 0, options_.planner.step, options_.planner.vehicle, stop);
     watch_.add({time, planning::PlanKind::committed, 0, 0, 0});
-    return stop;
+    return planner_->stop(from, space, doubt).motion;
   }
-  const std::array start = {ground_, map_start_};
-  const bool near_start = (from.position - map_start_).norm() < options_.known_start + kStartInSight;
-  const auto known =
-      near_start && options_.known_start > 0 ? view_->flown(start, options_.known_start) : view_;
-  window_.set(*known, from.position, planner_->radius(0));
-  const planning::MapSpace space(known);
+  window_.set(*known, from.position, planner_->radius(doubt));
   const Vector3d goal = T_map_world_ * goal_;
-  const planning::LocalPlan& plan = planner_->plan(from, goal, space, window_, 0.5 * frame.tracking);
+  const planning::LocalPlan& plan = planner_->plan(from, goal, space, window_, doubt);
   watch_.add({time, plan.kind, plan.speed_limit, plan.free_reach, plan.valid});
   return plan.motion;
 }
@@ -346,8 +373,7 @@ void ChainLoop::frame() {
   ChainFrame frame;
   frame.time = time;
   const auto number = static_cast<int>(record_.frames.size());
-  constexpr int kDropEvery = 10;
-  const bool arrives = options_.fault.kind != Fault::dropped_frames || number % kDropEvery != kDropEvery - 1;
+  const bool arrives = options_.fault.kind != Fault::dropped_frames || !is_dropped(task_.seed, number);
   Time stamp = vehicle_.truth().time;
   image_ = arrives ? picture(stamp) : cv::Mat();
   update_ = nullptr;
@@ -380,7 +406,7 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
       std::max(1, static_cast<int>(std::lround(1 / (options_.frame_rate * NavigatedVehicle::step))));
   const double period = ticks * NavigatedVehicle::step;
   const double way = (task_.goal - task_.start).norm();
-  while (now() < options_.time_limit) {
+  while (now() < climbed_ + options_.time_limit) {
     frame();
     const double began = processor_seconds();
     std::vector<MotionState> next = decide(now() + period);
@@ -427,7 +453,7 @@ Result<ChainRecord> fly_chain(const FlightTask& task, const ChainFlightOptions& 
   ChainLoop loop(task, options, std::move(mapper).value(), std::atan2(way.y(), way.x()));
   if (options.fault.kind == Fault::crossing) {
     auto passer_by = PasserBy::create(task, forward_camera(options.width), frame_options(options, task.seed),
-                                      options.fault.crossing_ahead, options.fault.from);
+                                      options.fault.crossing_ahead, options.fault.crossing_at);
     if (!passer_by) return passer_by.error();
     loop.await(std::move(passer_by).value());
   }

@@ -30,7 +30,7 @@ struct ChainFlightOptions {
   simulation::RenderOptions render;
   FaultOptions fault;
   double frame_rate = 10;     ///< Hz; a plan takes effect one frame after its image
-  double time_limit = 120;    ///< s in the air
+  double time_limit = 120;    ///< s after the climb
   double stand = 8;           ///< s at rest before take-off, for the filter to start in
   double climb = 1.2;         ///< m that it climbs to the start, camera on: the first baseline
   double known_start = 1.5;   ///< m about this climb that are known to be free
@@ -47,7 +47,7 @@ struct ChainFlightOptions {
     field("render", self.render, "how the light is drawn");
     field("fault", self.fault, "what goes wrong on purpose");
     field("frame_rate", self.frame_rate, "Hz");
-    field("time_limit", self.time_limit, "s in the air");
+    field("time_limit", self.time_limit, "s after the climb");
     field("stand", self.stand, "s at rest before take-off");
     field("climb", self.climb, "m that it climbs to the start of its way");
     field("known_start", self.known_start, "m about this climb that are known to be free");

@@ -14,7 +14,7 @@ struct ExactFlightOptions {
   planning::LocalPlannerOptions planner;
   mapping::MapOptions map = exact_map();
   double frame_rate = 10;    ///< Hz; a plan takes effect one frame after its image
-  double time_limit = 180;   ///< s
+  double time_limit = 120;   ///< s
   double known_start = 1.5;  ///< m about the start that are known to be free
   int width = 320;           ///< of the image, with a horizontal field of view of 60 degrees
 

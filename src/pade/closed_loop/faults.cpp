@@ -1,5 +1,6 @@
 #include "pade/closed_loop/faults.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -66,7 +67,42 @@ Result<OpenWorldScene> with_blank_wall(const OpenWorldScene& as) {
       "seed)"};
 }
 
+/// A number in [0, 1) for each frame of a seed (the finaliser of SplitMix64).
+double chance(std::uint64_t seed, int frame) {
+  std::uint64_t z = seed * 0x9e3779b97f4a7c15U + static_cast<std::uint64_t>(frame) + 0x632be59bd9b4e019U;
+  for (const std::uint64_t factor : {0xbf58476d1ce4e5b9U, 0x94d049bb133111ebU}) z = (z ^ (z >> 29)) * factor;
+  return static_cast<double>((z ^ (z >> 32)) >> 11) * 0x1p-53;
+}
+
 }  // namespace
+
+bool is_dropped(std::uint64_t seed, int frame) {
+  // Runs of one, two or three frames begin at random: together one frame in ten.
+  constexpr std::array kRuns = {0.075, 0.0205, 0.0065};  // that one of at least that length begins
+  for (int before = 0; before < static_cast<int>(kRuns.size()); ++before) {
+    if (frame >= before && chance(seed, frame - before) < kRuns[static_cast<std::size_t>(before)]) return true;
+  }
+  return false;
+}
+
+FaultOptions::Seconds FaultOptions::seconds_of(double flight) const {
+  constexpr double kPassing = 4;  // s that somebody is in the way
+  const auto between = [&](double begin, double end) -> Seconds {
+    return {std::clamp(flight - begin, 0.0, end - begin), std::max(flight - end, 0.0)};
+  };
+  switch (kind) {
+    case Fault::none:
+      return {0, 0};
+    case Fault::gnss_outage:
+    case Fault::frozen_camera:
+    case Fault::gust:
+      return between(from, from + duration);
+    case Fault::crossing:
+      return between(crossing_at - kPassing / 2, crossing_at + kPassing / 2);
+    default:
+      return {flight, 0};
+  }
+}
 
 Result<OpenWorldScene> built_for(Fault fault, OpenWorldScene world) {
   if (fault == Fault::low_sun) return with_low_sun(world);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string_view>
 #include <utility>
 
@@ -23,7 +24,7 @@ enum class Fault {
   early_stamps,    ///< ... earlier
   gust,            ///< wind from the side, for a time
   exposure_jump,   ///< the light that reaches the sensor halves and doubles, every second
-  dropped_frames,  ///< one frame in ten never arrives
+  dropped_frames,  ///< one frame in ten never arrives; now and then two or three in a row
   compass_error,   ///< the magnetometer is turned about the vertical
   motion_blur,     ///< exposure of 10 ms
   crossing,        ///< somebody walks across the way, close ahead
@@ -33,12 +34,13 @@ enum class Fault {
 
 struct FaultOptions {
   Fault kind = Fault::none;
-  double from = 6;                ///< s after take-off
+  double from = 3;                ///< s after take-off
   double duration = 10;           ///< s
   double stamp_error = 0.03;      ///< s
   double gust = 5;                ///< m/s
   double compass_error = 0.5236;  ///< rad
   double crossing_ahead = 9;      ///< m
+  double crossing_at = 6;         ///< s after take-off
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -49,13 +51,25 @@ struct FaultOptions {
     field("gust", self.gust, "wind of a gust, m/s");
     field("compass_error", self.compass_error, "turn of the magnetometer about the vertical, rad");
     field("crossing_ahead", self.crossing_ahead,
-          "how far along the way somebody crosses it, `from` seconds after take-off, m");
+          "how far along the way somebody crosses it, m");
+    field("crossing_at", self.crossing_at, "when, s after take-off");
   }
   /// Whether it goes on at this time of a flight (s).
   [[nodiscard]] bool is_on(Fault what, double time) const {
     return kind == what && time >= from && time < from + duration;
   }
+  /// How long a flight went on under it, s, and after it was over.
+  /// @param flight  s from take-off to its end
+  struct Seconds {
+    double under;
+    double after;
+  };
+  [[nodiscard]] Seconds seconds_of(double flight) const;
 };
+
+/// Whether a frame never arrives: one in ten, at random, now and then two or three in a row.
+/// @param seed  of the flight. @param frame  counted from take-off
+bool is_dropped(std::uint64_t seed, int frame);
 
 /// What stands in a world, or lights it, for a fault; the world as it is for the others.
 /// Refuses a world in which a blank wall leaves no way for a ball of 0.5 m.

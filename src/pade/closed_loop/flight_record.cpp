@@ -10,6 +10,7 @@ namespace {
 constexpr double kFarthest = 2;     // clearances are measured up to here, m
 constexpr double kStanding = 0.05;  // m/s
 constexpr double kMoving = 0.3;     // m/s
+constexpr double kAtRest = 0.2;     // m/s: no more than the sway of one that holds its place
 
 }  // namespace
 
@@ -31,12 +32,7 @@ double yaw_of(const Eigen::Quaterniond& R_world_body) {
 bool FlightWatch::look(const planning::MotionState& truth) {
   const double clearance =
       task_.surface.inside(truth.position) ? 0 : task_.surface.to(truth.position, kFarthest);
-  if (!record_.samples.empty())
-    record_.length += (truth.position - record_.samples.back().state.position).norm();
   record_.samples.push_back({truth, clearance});
-  const double speed = truth.velocity.norm();
-  if (moving_ && speed < kStanding) ++record_.stops;
-  moving_ = speed > kMoving || (moving_ && speed >= kStanding);
   collided_ = collided_ || clearance < radius_;
   return !collided_;
 }
@@ -44,6 +40,20 @@ bool FlightWatch::look(const planning::MotionState& truth) {
 double FlightWatch::goal_distance() const {
   const Eigen::Vector3d& at = record_.samples.empty() ? task_.start : record_.samples.back().state.position;
   return (at - task_.goal).head<2>().norm();
+}
+
+/// Length and stops; the end of the climb is none.
+void FlightWatch::measure_way(double from) {
+  bool moving = false;
+  const FlightSample* before = nullptr;
+  for (const FlightSample& sample : record_.samples) {
+    if (sample.state.time < from) continue;
+    if (before != nullptr) record_.length += (sample.state.position - before->state.position).norm();
+    const double speed = sample.state.velocity.norm();
+    if (moving && speed < kStanding) ++record_.stops;
+    moving = speed > kMoving || (moving && speed >= kStanding);
+    before = &sample;
+  }
 }
 
 FlightRecord FlightWatch::finished(Outcome outcome, double from) {
@@ -55,10 +65,12 @@ FlightRecord FlightWatch::finished(Outcome outcome, double from) {
       record_.least_clearance = std::min(record_.least_clearance, sample.clearance);
   }
   if (record_.samples.empty()) return std::move(record_);
-  record_.duration = record_.samples.back().state.time;
-  const double made_good =
-      (task_.goal - task_.start).norm() - (task_.goal - record_.samples.back().state.position).norm();
-  if (record_.duration > 0) record_.goal_velocity = made_good / record_.duration;
+  const planning::MotionState& end = record_.samples.back().state;
+  record_.duration = end.time;
+  record_.stands = end.velocity.norm() < kAtRest;
+  measure_way(from);
+  const double made_good = (task_.goal - task_.start).norm() - (task_.goal - end.position).norm();
+  if (record_.duration > from) record_.goal_velocity = made_good / (record_.duration - from);
   return std::move(record_);
 }
 

@@ -42,12 +42,13 @@ struct FlightPlan {
 
 struct FlightRecord {
   Outcome outcome = Outcome::timed_out;
-  double duration = 0;         ///< s
-  double length = 0;           ///< flown, m
-  double goal_velocity = 0;    ///< way made good toward the goal over the time, m/s
+  double duration = 0;         ///< s, climb included
+  double length = 0;           ///< flown on the way, m
+  double goal_velocity = 0;    ///< way made good toward the goal over the time of the way, m/s
   double goal_distance = 0;    ///< horizontal, from the true goal at the end, m
   double least_clearance = 0;  ///< of the centre from the nearest true surface, m
   int stops = 0;               ///< times that it stood still on the way
+  bool stands = false;         ///< at the end
   std::vector<FlightSample> samples;
   std::vector<FlightPlan> plans;
 };
@@ -81,13 +82,15 @@ class FlightWatch {
   [[nodiscard]] double goal_distance() const;
   void add(const FlightPlan& plan) { record_.plans.push_back(plan); }
   /// Ends the flight. A collision that was seen stays one.
-  /// @param from  s: the least clearance is of the time from here on, unless it collides before
+  /// @param from  s: when its way began. Clearance (unless it collides before), length, stops and velocity
+  ///              count from here on.
   FlightRecord finished(Outcome outcome, double from = 0);
 
  private:
+  void measure_way(double from);
+
   const FlightTask& task_;
   double radius_;
-  bool moving_ = false;
   bool collided_ = false;
   FlightRecord record_;
 };
