@@ -20,6 +20,10 @@
 
 namespace pade::cli {
 
+/// Raised by every change after which a flight of the same options ends otherwise: a folder holds flights of
+/// one revision.
+inline constexpr int flight_revision = 2;
+
 /// What flies.
 enum class Flier {
   chain,     ///< the whole module: rendered images, simulated instruments, own navigation, depth and map
@@ -56,22 +60,28 @@ class Fleet {
   /// @param progress  called with a line about the flights that are in the air; from one thread at a time
   Status fly(const std::function<void(std::size_t done, const std::string& note)>& progress);
 
-  /// One per seed: `seed`, `outcome`, and the measures of docs/fly.md.
+  /// One per seed that has a world to fly in: `seed`, `outcome`, and the measures of docs/fly.md.
   [[nodiscard]] const std::vector<nlohmann::ordered_json>& flown() const { return flown_; }
+  /// Those that have none: `seed` and `reason`.
+  [[nodiscard]] const std::vector<nlohmann::ordered_json>& refused() const { return refused_; }
   /// Who made them: program, world, options.
   [[nodiscard]] const nlohmann::ordered_json& made_of() const { return made_of_; }
 
  private:
   void take_flights();
   Status fly_one(std::size_t index);
-  Status fly_with(std::size_t index, const closed_loop::FlightTask& task);
-  [[nodiscard]] Result<simulation::OpenWorldScene> world_of(std::uint64_t seed);
+  Status fly_with(std::size_t index, const closed_loop::FlightTask& task,
+                  const nlohmann::ordered_json& identity);
+  void refuse(std::size_t index, const std::string& reason);
+  /// Empty, with the reason, where there is none that can be flown in.
+  [[nodiscard]] Result<std::optional<simulation::OpenWorldScene>> world_of(std::uint64_t seed,
+                                                                           std::string& reason);
   [[nodiscard]] std::filesystem::path folder_of(std::uint64_t seed) const;
-  Status find_flown(std::size_t index);
+  Status find_flown(std::size_t index, const nlohmann::ordered_json& identity);
   bool report(std::size_t index, double share);
 
   FleetOptions options_;
-  std::vector<nlohmann::ordered_json> flown_;
+  std::vector<nlohmann::ordered_json> flown_, refused_;
   std::vector<double> share_;  // of each way
   nlohmann::ordered_json made_of_;
   std::atomic<std::size_t> next_ = 0;
@@ -83,6 +93,13 @@ class Fleet {
 
 /// flights.json: who made them, their totals, the flights.
 nlohmann::ordered_json summary_of(const Fleet& fleet);
+
+/// Seed of the instruments and of the image noise of a flight: another one for each kind of world and fault,
+/// so that the errors of no two flights of a table are the same; the same for whatever flies.
+std::uint64_t instrument_seed(const FlightPlace& place, closed_loop::Fault fault, std::uint64_t seed);
+
+/// Over the flights that have this measure; empty where none has.
+std::optional<double> mean_of(const std::vector<nlohmann::ordered_json>& flown, const char* measure);
 
 /// Counts of outcomes with exact 95 % intervals, and means.
 nlohmann::ordered_json totals_of(const std::vector<nlohmann::ordered_json>& flown);

@@ -193,21 +193,25 @@ Status write_all(const fs::path& folder, const Files& files) {
 
 ordered_json measures_of(const FlightTask& task, const FlightRecord& r, double radius) {
   const double way = (task.goal - task.start).norm();
+  const double rest = r.samples.empty() ? way : (task.goal - r.samples.back().state.position).norm();
+  const bool arrived = r.outcome == Outcome::arrived;
   const closed_loop::WorldMeasures world = closed_loop::measures_of_world(task, radius);
   return {{"outcome", to_name(r.outcome)},
           {"duration_s", r.duration},
           {"length_m", r.length},
-          {"path_excess", r.length / way - 1},
+          {"path_excess", arrived ? ordered_json((r.length + rest) / way - 1) : ordered_json()},
           {"goal_velocity_m_s", r.goal_velocity},
           {"goal_distance_m", r.goal_distance},
           {"least_clearance_m", r.least_clearance},
           {"stops", r.stops},
+          {"stands_at_the_end", r.stands},
           {"traversability", world.traversability},
           {"relative_gap", world.relative_gap ? ordered_json(*world.relative_gap) : ordered_json()},
           {"straight_way_is_free", straight_way_is_free(task, radius)}};
 }
 
-ordered_json measures_of(const FlightTask& task, const ChainRecord& r, double radius) {
+ordered_json measures_of(const FlightTask& task, const ChainRecord& r, double radius,
+                         const FaultOptions& fault) {
   ordered_json measures = measures_of(task, r.flight, radius);
   double drift = 0;
   double tracking = 0;
@@ -218,6 +222,12 @@ ordered_json measures_of(const FlightTask& task, const ChainRecord& r, double ra
     tracking = std::max(tracking, f.tracking);
     mapped += f.outcome == MapperUpdate::Outcome::mapped ? 1 : 0;
     skipped += f.outcome == MapperUpdate::Outcome::skipped ? 1 : 0;
+  }
+  measures["climb_s"] = r.climbed;
+  if (fault.kind != Fault::none) {
+    const FaultOptions::Seconds seconds = fault.seconds_of(r.flight.duration);
+    measures["fault_seconds"] = seconds.under;
+    measures["seconds_after_fault"] = seconds.after;
   }
   measures["frames"] = r.frames.size();
   measures["frames_mapped"] = mapped;
@@ -298,7 +308,10 @@ std::string fleet_page(const ordered_json& all) {
   std::string body =
       "<div class=\"tiles\">\n" + tile(share("arrived"), "arrived") + tile(share("collided"), "collided") +
       tile(share("straight_way_is_free"), "straight way free: what flying blind would get") +
-      tile(fmt::format("{:.2f} m/s", totals["mean_goal_velocity_m_s"].get<double>()), "mean goal velocity") +
+      tile(totals["mean_goal_velocity_of_arrived_m_s"].is_null()
+               ? std::string("-")
+               : fmt::format("{:.2f} m/s", totals["mean_goal_velocity_of_arrived_m_s"].get<double>()),
+           "mean goal velocity of those that arrived") +
       "</div>\n<div class=\"scroll\"><table><tr><th>seed</th><th>outcome</th><th>s</th><th>m</th>"
       "<th>m/s</th><th>clearance m</th><th>stops</th><th>straight way</th></tr>\n";
   for (const ordered_json& f : all["flights"]) {
@@ -312,8 +325,12 @@ std::string fleet_page(const ordered_json& all) {
         f["goal_velocity_m_s"].get<double>(), f["least_clearance_m"].get<double>(), f["stops"].get<int>(),
         f["straight_way_is_free"].get<bool>() ? "free" : "blocked");
   }
+  body += "</table></div>\n";
+  for (const ordered_json& r : all["refused"])
+    body += fmt::format("<p class=\"warning\">seed {}: no flight: {}</p>\n", r["seed"].get<std::uint64_t>(),
+                        evaluation::escape_html(r["reason"].get<std::string>()));
   body +=
-      "</table></div>\n<h2>Options</h2><pre>" + evaluation::escape_html(all["options"].dump(2)) + "</pre>\n";
+      "<h2>Options</h2><pre>" + evaluation::escape_html(all["options"].dump(2)) + "</pre>\n";
   return page(fmt::format("Flights through {}", all["world"].get<std::string>()), body);
 }
 

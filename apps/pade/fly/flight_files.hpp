@@ -18,7 +18,8 @@ nlohmann::ordered_json measures_of(const closed_loop::FlightTask& task,
                                    const closed_loop::FlightRecord& flight, double radius);
 /// The same with those of the chain.
 nlohmann::ordered_json measures_of(const closed_loop::FlightTask& task,
-                                   const closed_loop::ChainRecord& flight, double radius);
+                                   const closed_loop::ChainRecord& flight, double radius,
+                                   const closed_loop::FaultOptions& fault);
 
 /// Pictures that the camera took on the way, with what was made of them.
 class FlightStrip {

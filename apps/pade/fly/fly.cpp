@@ -194,12 +194,12 @@ void print_totals(const ordered_json& totals) {
     return fmt::format("{} ({:.0f}-{:.0f} %)", t["flights"].get<std::size_t>(), 100 * t["low"].get<double>(),
                        100 * t["high"].get<double>());
   };
+  const ordered_json& velocity = totals["mean_goal_velocity_of_arrived_m_s"];
   fmt::print(
-      "{} flights: {} arrived, {} collided (95 % intervals); mean goal velocity {:.2f} m/s; straight way "
-      "free "
-      "in {}\n",
+      "{} flights: {} arrived, {} collided (95 % intervals); mean goal velocity of those that arrived {}; "
+      "straight way free in {}\n",
       totals["flights"].get<std::size_t>(), share("arrived"), share("collided"),
-      totals["mean_goal_velocity_m_s"].get<double>(),
+      velocity.is_null() ? "-" : fmt::format("{:.2f} m/s", velocity.get<double>()),
       totals["straight_way_is_free"]["flights"].get<std::size_t>());
 }
 
@@ -218,6 +218,11 @@ Status fly(const FlyArguments& arguments) {
       !s)
     return s;
   if (io::interrupted()) return Error{"interrupted; with --out the flights that are finished are kept"};
+  for (const ordered_json& r : fleet.refused()) {
+    const auto reason = r["reason"].get<std::string>();
+    if (fleet.flown().empty()) return Error{reason};
+    fmt::print(stderr, "pade fly: warning: no flight with seed {}: {}\n", r["seed"].get<std::uint64_t>(), reason);
+  }
   const ordered_json all = summary_of(fleet);
   const std::string text = all.dump(2) + "\n";
   if (!arguments.out.empty()) {

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "pade/evaluation/binomial.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/text.hpp"
 #include "pade/pipeline/depth_from.hpp"
@@ -114,46 +113,116 @@ std::string share_text(const ordered_json& share) {
                      std::ceil(100 * share["high"].get<double>()));
 }
 
-double mean(const std::vector<ordered_json>& flown, const char* measure) {
-  double sum = 0;
-  for (const ordered_json& f : flown) sum += f.value(measure, 0.0);
-  return sum / static_cast<double>(flown.size());
+/// Flights that make one row of the table.
+struct Row {
+  std::string configuration;
+  std::string world;
+  std::optional<double> density;  ///< empty: of several
+  std::vector<ordered_json> flown;
+  std::vector<ordered_json> refused;
+};
+
+void add_flights(const Row& from, Row& to) {
+  to.flown.insert(to.flown.end(), from.flown.begin(), from.flown.end());
+  for (ordered_json refused : from.refused) {
+    refused["world"] = from.world;
+    refused["configuration"] = from.configuration;
+    to.refused.push_back(std::move(refused));
+  }
 }
 
-ordered_json row_of(const std::string& configuration, const std::string& world, double density,
-                    const std::vector<ordered_json>& flown) {
-  const ordered_json totals = totals_of(flown);
-  double clearance = flown.front()["least_clearance_m"];
-  for (const ordered_json& f : flown) clearance = std::min(clearance, f["least_clearance_m"].get<double>());
-  return {{"configuration", configuration},
-          {"world", world},
-          {"density_per_ha", density},
-          {"totals", totals},
-          {"least_clearance_m", clearance},
-          {"path_excess", mean(flown, "path_excess")},
-          {"stops", mean(flown, "stops")},
-          {"seconds_blind", mean(flown, "seconds_blind")},
-          {"traversability", mean(flown, "traversability")}};
+/// The rows of each kind of world, those of each configuration in all of them, and all faults together.
+std::vector<Row> with_pools(const std::vector<Row>& rows) {
+  std::vector<Row> all;
+  Row faults{"all faults", "all", {}, {}, {}};
+  std::size_t fault_rows = 0;
+  for (std::size_t i = 0; i < rows.size();) {
+    const std::string& name = rows[i].configuration;
+    Row pool{name, "all", rows[i].density, {}, {}};
+    const std::size_t first = i;
+    for (; i < rows.size() && rows[i].configuration == name; ++i) {
+      all.push_back(rows[i]);
+      add_flights(rows[i], pool);
+    }
+    if (from_name<Fault>(name)) {
+      ++fault_rows;
+      for (std::size_t k = first; k < i; ++k) add_flights(rows[k], faults);
+    }
+    if (i - first > 1) all.push_back(std::move(pool));
+  }
+  if (fault_rows > 1) all.push_back(std::move(faults));
+  return all;
+}
+
+ordered_json least(const std::vector<ordered_json>& flown, const char* measure) {
+  ordered_json found;
+  for (const ordered_json& f : flown) {
+    if (!f.contains(measure) || !f[measure].is_number()) continue;
+    if (found.is_null() || f[measure] < found) found = f[measure];
+  }
+  return found;
+}
+
+ordered_json row_of(const Row& row) {
+  ordered_json out = {{"configuration", row.configuration},
+                      {"world", row.world},
+                      {"density_per_ha", row.density ? ordered_json(*row.density) : ordered_json()},
+                      {"totals", totals_of(row.flown)},
+                      {"refused", row.refused},
+                      {"least_clearance_m", least(row.flown, "least_clearance_m")},
+                      {"least_passer_by_clearance_m", least(row.flown, "passer_by_clearance_m")}};
+  for (const char* measure : {"path_excess", "stops", "seconds_blind", "fault_seconds", "seconds_after_fault",
+                              "traversability", "relative_gap"}) {
+    const auto mean = mean_of(row.flown, measure);
+    out[measure] = mean ? ordered_json(*mean) : ordered_json();
+  }
+  return out;
+}
+
+std::string number_text(const ordered_json& value, int digits) {
+  return value.is_number() ? fmt::format("{:.{}f}", value.get<double>(), digits) : "-";
+}
+
+/// What the table does not count, with its reason.
+std::string remarks_of(const ordered_json& rows) {
+  std::string text;
+  for (const ordered_json& row : rows) {
+    const std::string name =
+        fmt::format("{}, {}", row["configuration"].get<std::string>(), row["world"].get<std::string>());
+    if (row["world"] == "all") continue;
+    for (const ordered_json& refused : row["refused"])
+      text += fmt::format("\nNot flown: {}, seed {}: {}.\n", name, refused["seed"].get<std::uint64_t>(),
+                          refused["reason"].get<std::string>());
+    if (const auto missed = row["totals"]["fault_not_met"].get<std::size_t>(); missed > 0)
+      text += fmt::format("\n{}: {} of the flights ended before the fault began.\n", name, missed);
+  }
+  return text;
 }
 
 std::string table_of(const ordered_json& rows) {
   std::string text =
-      "| configuration | world | flights | arrived (95 %) | collided (95 %) | stopped | astray | goal "
-      "velocity, m/s | least "
-      "clearance, m | path excess | stops | blind, s | traversability | straight way free |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "| configuration | world | flights | refused | arrived (95 %) | collided (95 %) | timed out, standing | timed "
+      "out, moving | astray | never ready | arrived or standing (95 %) | goal velocity of arrived, m/s | least "
+      "clearance, m | of a passer-by, m | path excess of arrived | stops | blind, s | under the fault, s | after "
+      "it, s | traversability | relative gap | straight way free |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const ordered_json& row : rows) {
     const ordered_json& t = row["totals"];
+    const auto standing = t["timed out, standing"].get<std::size_t>();
     text += fmt::format(
-        "| {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.1f} | {:.1f} | {} |\n",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} "
+        "|\n",
         row["configuration"].get<std::string>(), row["world"].get<std::string>(),
-        t["flights"].get<std::size_t>(), share_text(t["arrived"]), share_text(t["collided"]),
-        t["timed out"].get<std::size_t>(), t["astray"].get<std::size_t>(),
-        t["mean_goal_velocity_m_s"].get<double>(), row["least_clearance_m"].get<double>(),
-        row["path_excess"].get<double>(), row["stops"].get<double>(), row["seconds_blind"].get<double>(),
-        row["traversability"].get<double>(), t["straight_way_is_free"]["flights"].get<std::size_t>());
+        t["flights"].get<std::size_t>(), row["refused"].size(), share_text(t["arrived"]),
+        share_text(t["collided"]), standing, t["timed out"].get<std::size_t>() - standing,
+        t["astray"].get<std::size_t>(), t["never ready"].get<std::size_t>(), share_text(t["safe"]),
+        number_text(t["mean_goal_velocity_of_arrived_m_s"], 2), number_text(row["least_clearance_m"], 2),
+        number_text(row["least_passer_by_clearance_m"], 2), number_text(row["path_excess"], 2),
+        number_text(row["stops"], 1), number_text(row["seconds_blind"], 1), number_text(row["fault_seconds"], 1),
+        number_text(row["seconds_after_fault"], 1), number_text(row["traversability"], 1),
+        number_text(row["relative_gap"], 1), t["straight_way_is_free"]["flights"].get<std::size_t>());
   }
-  return text;
+  return text + remarks_of(rows);
 }
 
 Status write_cell(const fs::path& folder, const Fleet& fleet) {
@@ -229,12 +298,15 @@ Status fly_grid(const GridOptions& options) {
                options.out.string(), options.shard, options.shards);
     return {};
   }
-  ordered_json rows = ordered_json::array();
+  std::vector<Row> cells_flown;
   for (std::size_t i = 0; i < fleets.size(); ++i) {
     const FleetOptions& fleet = made[i].second;
     if (const Status s = write_cell(fleet.out, fleets[i]); !s) return s;
-    rows.push_back(row_of(made[i].first->name, fleet.place.name, fleet.place.density, fleets[i].flown()));
+    cells_flown.push_back({made[i].first->name, fleet.place.name, fleet.place.density, fleets[i].flown(),
+                           fleets[i].refused()});
   }
+  ordered_json rows = ordered_json::array();
+  for (const Row& row : with_pools(cells_flown)) rows.push_back(row_of(row));
   const std::string json = rows.dump(2) + "\n";
   if (const Status s = io::write_file(options.out / "grid.json", json, io::Overwrite::replace); !s) return s;
   const std::string table = table_of(rows);

@@ -83,8 +83,8 @@ bool is_passable(const SurfaceDistance& surface, const Vector3d& start, const Ve
   return PassageSearch(surface, start, goal, options).run();
 }
 
-Result<OpenWorldScene> make_open_world(OpenWorldKind kind, std::uint64_t seed, double density,
-                                       const std::filesystem::path& world_file) {
+Result<std::optional<OpenWorldScene>> find_open_world(OpenWorldKind kind, std::uint64_t seed, double density,
+                                                      const std::filesystem::path& world_file) {
   if (!(density >= least_density && density <= greatest_density))
     return Error{fmt::format("--density: found {}, expected {} to {} per hectare", density, least_density,
                              greatest_density)};
@@ -97,10 +97,20 @@ Result<OpenWorldScene> make_open_world(OpenWorldKind kind, std::uint64_t seed, d
     if (!scene) return scene.error();
     auto surface = SurfaceDistance::build(*scene);
     if (!surface) return surface.error();
-    if (is_passable(*surface, made.start, made.goal))
-      return OpenWorldScene{std::move(scene).value(), std::move(surface).value(), made.start, made.goal,
-                            attempt};
+    if (is_passable(*surface, made.start, made.goal)) {
+      OpenWorldScene found{std::move(scene).value(), std::move(surface).value(), made.start, made.goal,
+                           attempt};
+      return std::optional(std::move(found));
+    }
   }
+  return std::optional<OpenWorldScene>();
+}
+
+Result<OpenWorldScene> make_open_world(OpenWorldKind kind, std::uint64_t seed, double density,
+                                       const std::filesystem::path& world_file) {
+  auto found = find_open_world(kind, seed, density, world_file);
+  if (!found) return found.error();
+  if (*found) return std::move(**found);
   return Error{fmt::format(
       "--random {} --seed {} --density {}: found no way for a ball of 0.5 m through {} worlds of this seed, "
       "expected one (fewer obstacles, or another seed)",

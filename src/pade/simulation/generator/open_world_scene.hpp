@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 
 #include "pade/core/result.hpp"
 #include "pade/simulation/generator/open_world.hpp"
@@ -32,6 +33,10 @@ struct OpenWorldScene {
   Eigen::Vector3d goal;
   int attempt = 0;  ///< of generate_open_world(): how many worlds of this seed had no way through
 };
+
+/// As make_open_world(), but nothing, which is no error, where none of the 10 worlds of a seed has a way.
+Result<std::optional<OpenWorldScene>> find_open_world(OpenWorldKind kind, std::uint64_t seed, double density,
+                                                      const std::filesystem::path& world_file);
 
 /// Writes the first world of this seed that a ball of 0.5 m gets through to `world_file` (meshes beside it)
 /// and builds it. Refuses a density out of range, a seed without such a world in 10 attempts, and files that
