@@ -13,18 +13,24 @@ namespace {
 using Eigen::Vector3d;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Balls in free space, of which everything is known.
+/// Balls and walls in free space, of which everything is known.
 class Balls : public FreeSpace {
  public:
   struct Ball {
     Vector3d centre;
     double radius;
   };
+  struct Wall {
+    Vector3d normal;  // into the free space
+    double at;        // along it, m
+  };
   std::vector<Ball> balls;
+  std::vector<Wall> walls;
 
   [[nodiscard]] double clearance(const Vector3d& p) const {
     double nearest = kInfinity;
     for (const Ball& ball : balls) nearest = std::min(nearest, (p - ball.centre).norm() - ball.radius);
+    for (const Wall& wall : walls) nearest = std::min(nearest, wall.normal.dot(p) - wall.at);
     return nearest;
   }
   [[nodiscard]] double clear_length(std::span<const Vector3d> path, double radius, bool) const override {
@@ -153,12 +159,10 @@ TEST(LocalPlanner, BrakesBeforeWhatItSeesTooLate) {
   for (const double ahead : {0.6, 0.8, 1.0}) {
     Balls space;
     InFlight flight(space);
-    // Wider than any turn, as far ahead as that: less than its way of braking.
-    for (double y = -3; y <= 3; y += 0.1) {
-      for (double z = 0; z <= 3.2; z += 0.1)
-        space.balls.push_back({{flight.next.position.x() + 0.4 + ahead + 0.05, y, z}, 0.05});
-    }
-    const LocalPlan second = flight.planner.plan(flight.next, {30, 0, 1.6}, space, unseen_window(flight.next.position));
+    // Across the way, less than its way of braking ahead.
+    space.walls.push_back({-Vector3d::UnitX(), -(flight.next.position.x() + 0.4 + ahead)});
+    const LocalPlan second =
+        flight.planner.plan(flight.next, {30, 0, 1.6}, space, unseen_window(flight.next.position));
     EXPECT_EQ(second.kind, PlanKind::committed);
     EXPECT_EQ(second.valid, 0);
     EXPECT_LT(second.motion.back().time - flight.next.time, 2 / 3.0 + 0.11) << ahead;
@@ -171,7 +175,8 @@ TEST(LocalPlanner, BrakesWhereEverythingIsOccupied) {
   Balls space;
   InFlight flight(space);
   space.balls.push_back({{0.2, 0, 1.6}, 5});
-  const LocalPlan second = flight.planner.plan(flight.next, {30, 0, 1.6}, space, unseen_window(flight.next.position));
+  const LocalPlan second =
+      flight.planner.plan(flight.next, {30, 0, 1.6}, space, unseen_window(flight.next.position));
   EXPECT_EQ(second.kind, PlanKind::committed);
   EXPECT_EQ(second.valid, 0);
   EXPECT_LT(second.motion.back().time - flight.next.time, 2 / 3.0 + 0.11);
@@ -182,10 +187,9 @@ TEST(LocalPlanner, FliesTheRestOfItsPlanWhileThatIsFree) {
   Balls space;
   InFlight flight(space);
   const double end = flight.first.motion.back().position.x() + 0.1;  // and what it overshoots by
-  for (double y = -6; y <= 6; y += 0.1) {
-    for (double z = 0; z <= 3.2; z += 0.1) space.balls.push_back({{end + 0.46, y, z}, 0.05});
-  }
-  const LocalPlan second = flight.planner.plan(flight.next, {30, 0, 1.6}, space, unseen_window(flight.next.position));
+  space.walls.push_back({-Vector3d::UnitX(), -(end + 0.41)});
+  const LocalPlan second =
+      flight.planner.plan(flight.next, {30, 0, 1.6}, space, unseen_window(flight.next.position));
   if (second.kind == PlanKind::flying) {
     EXPECT_LT(second.motion.back().position.x(), end);
     return;
@@ -211,9 +215,7 @@ TEST(LocalPlanner, KeepsRoomBehindItsStandstill) {
   Balls space;
   InFlight flight(space);
   const double end = flight.first.motion.back().position.x();
-  for (double y = -6; y <= 6; y += 0.1) {
-    for (double z = 0; z <= 3.2; z += 0.1) space.balls.push_back({{end + 0.4 + 0.05 + 0.06, y, z}, 0.05});
-  }
+  space.walls.push_back({-Vector3d::UnitX(), -(end + 0.4 + 0.06)});
   MotionState from = at_rest({0, 0, 1.6});
   from.velocity = {2, 0, 0};
   LocalPlanner planner = planner_of();
@@ -226,9 +228,7 @@ TEST(LocalPlanner, KeepsRoomBehindItsStandstill) {
 TEST(LocalPlanner, GetsAwayFromWhatItNearlyTouches) {
   for (const double gap : {0.39, 0.33, 0.25}) {
     Balls space;
-    for (double y = -3; y <= 3; y += 0.1) {  // a wall to the left of the way
-      for (double z = 0; z <= 3.2; z += 0.1) space.balls.push_back({{y, gap + 0.05, z}, 0.05});
-    }
+    space.walls.push_back({-Vector3d::UnitY(), -gap});  // to the left of the way
     LocalPlanner planner = planner_of();
     MotionState state = at_rest({0, 0, 1.6});
     double nearest = gap;

@@ -93,22 +93,26 @@ Status check_way(const FlightTask& task, double climb, const planning::VehicleLi
                              (task.goal - task.start).norm(), kShortest)};
   for (const auto& [name, place] : {std::pair{"--start", task.start}, std::pair{"--goal", task.goal}}) {
     if (place.z() < vehicle.lowest || place.z() > vehicle.highest)
-      return Error{fmt::format("{}: found height {:.2f} m, expected {} to {} m (planner.vehicle.lowest, highest)",
-                               name, place.z(), vehicle.lowest, vehicle.highest)};
+      return Error{
+          fmt::format("{}: found height {:.2f} m, expected {} to {} m (planner.vehicle.lowest, highest)",
+                      name, place.z(), vehicle.lowest, vehicle.highest)};
   }
   const auto check_place = [&](const char* name, const Eigen::Vector3d& place) -> Status {
     if (!task.surface.touches(place, vehicle.radius) && !task.surface.inside(place)) return {};
-    return Error{fmt::format("{}: found a surface nearer than {} m to ({:.2f}, {:.2f}, {:.2f}), expected free space",
-                             name, vehicle.radius, place.x(), place.y(), place.z())};
+    return Error{
+        fmt::format("{}: found a surface nearer than {} m to ({:.2f}, {:.2f}, {:.2f}), expected free space",
+                    name, vehicle.radius, place.x(), place.y(), place.z())};
   };
   if (const Status s = check_place("--start", task.start); !s) return s;
   if (const Status s = check_place("--goal", task.goal); !s) return s;
   for (double below = climb; below > 0; below -= kStep) {
     const Eigen::Vector3d at = task.start - below * Eigen::Vector3d::UnitZ();
-    if (const Status s = check_place(below == climb ? "the place of take-off" : "the climb", at); !s) return s;
+    if (const Status s = check_place(below == climb ? "the place of take-off" : "the climb", at); !s)
+      return s;
   }
   if (task.scene.distance(task.start - climb * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitZ()) < climb)
-    return Error{fmt::format("the climb of {} m to --start: found a surface across it, expected free space", climb)};
+    return Error{
+        fmt::format("the climb of {} m to --start: found a surface across it, expected free space", climb)};
   return {};
 }
 
@@ -303,9 +307,8 @@ Status Fleet::fly_with(std::size_t index, const FlightTask& task, const ordered_
   });
   if (io::interrupted()) return {};  // whoever called knows
   if (!record) return record.error();
-  return finish(measures_of(task, *record, radius, options.fault), [&](const ordered_json& whole) {
-    return write_flight(folder, whole, task, *record, strip);
-  });
+  return finish(measures_of(task, *record, radius, options.fault),
+                [&](const ordered_json& whole) { return write_flight(folder, whole, task, *record, strip); });
 }
 
 /// Takes a flight that an earlier run has finished, if it was flown by this program with these options in

@@ -329,8 +329,7 @@ std::string fleet_page(const ordered_json& all) {
   for (const ordered_json& r : all["refused"])
     body += fmt::format("<p class=\"warning\">seed {}: no flight: {}</p>\n", r["seed"].get<std::uint64_t>(),
                         evaluation::escape_html(r["reason"].get<std::string>()));
-  body +=
-      "<h2>Options</h2><pre>" + evaluation::escape_html(all["options"].dump(2)) + "</pre>\n";
+  body += "<h2>Options</h2><pre>" + evaluation::escape_html(all["options"].dump(2)) + "</pre>\n";
   return page(fmt::format("Flights through {}", all["world"].get<std::string>()), body);
 }
 

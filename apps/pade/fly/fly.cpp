@@ -221,7 +221,8 @@ Status fly(const FlyArguments& arguments) {
   for (const ordered_json& r : fleet.refused()) {
     const auto reason = r["reason"].get<std::string>();
     if (fleet.flown().empty()) return Error{reason};
-    fmt::print(stderr, "pade fly: warning: no flight with seed {}: {}\n", r["seed"].get<std::uint64_t>(), reason);
+    fmt::print(stderr, "pade fly: warning: no flight with seed {}: {}\n", r["seed"].get<std::uint64_t>(),
+               reason);
   }
   const ordered_json all = summary_of(fleet);
   const std::string text = all.dump(2) + "\n";

@@ -201,16 +201,20 @@ std::string remarks_of(const ordered_json& rows) {
 
 std::string table_of(const ordered_json& rows) {
   std::string text =
-      "| configuration | world | flights | refused | arrived (95 %) | collided (95 %) | timed out, standing | timed "
-      "out, moving | astray | never ready | arrived or standing (95 %) | goal velocity of arrived, m/s | least "
-      "clearance, m | of a passer-by, m | path excess of arrived | stops | blind, s | under the fault, s | after "
+      "| configuration | world | flights | refused | arrived (95 %) | collided (95 %) | timed out, standing "
+      "| timed "
+      "out, moving | astray | never ready | arrived or standing (95 %) | goal velocity of arrived, m/s | "
+      "least "
+      "clearance, m | of a passer-by, m | path excess of arrived | stops | blind, s | under the fault, s | "
+      "after "
       "it, s | traversability | relative gap | straight way free |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const ordered_json& row : rows) {
     const ordered_json& t = row["totals"];
     const auto standing = t["timed out, standing"].get<std::size_t>();
     text += fmt::format(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} "
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} "
+        "| {} | {} "
         "|\n",
         row["configuration"].get<std::string>(), row["world"].get<std::string>(),
         t["flights"].get<std::size_t>(), row["refused"].size(), share_text(t["arrived"]),
@@ -218,9 +222,10 @@ std::string table_of(const ordered_json& rows) {
         t["astray"].get<std::size_t>(), t["never ready"].get<std::size_t>(), share_text(t["safe"]),
         number_text(t["mean_goal_velocity_of_arrived_m_s"], 2), number_text(row["least_clearance_m"], 2),
         number_text(row["least_passer_by_clearance_m"], 2), number_text(row["path_excess"], 2),
-        number_text(row["stops"], 1), number_text(row["seconds_blind"], 1), number_text(row["fault_seconds"], 1),
-        number_text(row["seconds_after_fault"], 1), number_text(row["traversability"], 1),
-        number_text(row["relative_gap"], 1), t["straight_way_is_free"]["flights"].get<std::size_t>());
+        number_text(row["stops"], 1), number_text(row["seconds_blind"], 1),
+        number_text(row["fault_seconds"], 1), number_text(row["seconds_after_fault"], 1),
+        number_text(row["traversability"], 1), number_text(row["relative_gap"], 1),
+        t["straight_way_is_free"]["flights"].get<std::size_t>());
   }
   return text + remarks_of(rows);
 }
@@ -302,8 +307,8 @@ Status fly_grid(const GridOptions& options) {
   for (std::size_t i = 0; i < fleets.size(); ++i) {
     const FleetOptions& fleet = made[i].second;
     if (const Status s = write_cell(fleet.out, fleets[i]); !s) return s;
-    cells_flown.push_back({made[i].first->name, fleet.place.name, fleet.place.density, fleets[i].flown(),
-                           fleets[i].refused()});
+    cells_flown.push_back(
+        {made[i].first->name, fleet.place.name, fleet.place.density, fleets[i].flown(), fleets[i].refused()});
   }
   ordered_json rows = ordered_json::array();
   for (const Row& row : with_pools(cells_flown)) rows.push_back(row_of(row));

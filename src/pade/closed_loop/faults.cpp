@@ -80,7 +80,8 @@ bool is_dropped(std::uint64_t seed, int frame) {
   // Runs of one, two or three frames begin at random: together one frame in ten.
   constexpr std::array kRuns = {0.075, 0.0205, 0.0065};  // that one of at least that length begins
   for (int before = 0; before < static_cast<int>(kRuns.size()); ++before) {
-    if (frame >= before && chance(seed, frame - before) < kRuns[static_cast<std::size_t>(before)]) return true;
+    if (frame >= before && chance(seed, frame - before) < kRuns[static_cast<std::size_t>(before)])
+      return true;
   }
   return false;
 }

@@ -50,8 +50,7 @@ struct FaultOptions {
     field("stamp_error", self.stamp_error, "s between a stamp and its image");
     field("gust", self.gust, "wind of a gust, m/s");
     field("compass_error", self.compass_error, "turn of the magnetometer about the vertical, rad");
-    field("crossing_ahead", self.crossing_ahead,
-          "how far along the way somebody crosses it, m");
+    field("crossing_ahead", self.crossing_ahead, "how far along the way somebody crosses it, m");
     field("crossing_at", self.crossing_at, "when, s after take-off");
   }
   /// Whether it goes on at this time of a flight (s).

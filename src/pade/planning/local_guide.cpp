@@ -161,6 +161,26 @@ void LocalGuide::set(const LocalWindow& window, const Vector3d& goal, const Heig
   price(window);
   start_from(goal, arrival);
   walk();
+  if (reaches_the_middle()) return;
+  std::fill(cost_.begin(), cost_.end(), kNever);
+  for (auto& bucket : queue_) bucket.clear();
+  start_from_sides(goal);
+  walk();
+}
+
+/// Where the vehicle is, to a tile.
+bool LocalGuide::reaches_the_middle() const {
+  constexpr int kNear = 5;  // cells
+  const int x0 = size_.x() / 2;
+  const int y0 = size_.y() / 2;
+  for (int z = 0; z < size_.z(); ++z) {
+    for (int y = std::max(y0 - kNear, 0); y < std::min(y0 + kNear, size_.y()); ++y) {
+      for (int x = std::max(x0 - kNear, 0); x < std::min(x0 + kNear, size_.x()); ++x) {
+        if (std::isfinite(at(x, y, z))) return true;
+      }
+    }
+  }
+  return false;
 }
 
 double LocalGuide::at(int x, int y, int z) const {

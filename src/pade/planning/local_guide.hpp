@@ -20,7 +20,8 @@ class LocalGuide {
     double highest;
   };
   /// Lengths of ways to `goal` (world, m) from all cells of the window. Where something stands at the goal,
-  /// of the ways to the places nearest to it.
+  /// of the ways to the places nearest to it; where no way leads from there to the middle of the window, of
+  /// those out of the window.
   /// @param arrival  horizontally as near to the goal is there, m
   void set(const LocalWindow& window, const Eigen::Vector3d& goal, const Heights& heights,
            double arrival = 0);
@@ -38,6 +39,7 @@ class LocalGuide {
   void start_from_sides(const Eigen::Vector3d& goal);
   void offer(Index cell, std::uint32_t cost);
   void walk();
+  [[nodiscard]] bool reaches_the_middle() const;
   [[nodiscard]] double at(int x, int y, int z) const;
   [[nodiscard]] Eigen::Vector3d centre_of(int x, int y, int z) const;
 

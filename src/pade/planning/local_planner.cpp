@@ -223,7 +223,8 @@ double LocalPlanner::best_heading(const Task& task) const {
 
 bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command) {
   foretell(task.from, command, options_.horizon, options_.step, options_.vehicle, candidate_);
-  if (!is_in_bounds(task, candidate_, true) || clear_length(task, candidate_, near_) != kInfinity) return false;
+  if (!is_in_bounds(task, candidate_, true) || clear_length(task, candidate_, near_) != kInfinity)
+    return false;
   plan_.kind = PlanKind::recovering;
   plan_.command = command;
   plan_.motion.swap(candidate_);

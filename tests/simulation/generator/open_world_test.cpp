@@ -1,4 +1,9 @@
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <filesystem>
+#include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -82,20 +87,47 @@ Things things_of(World world) {
 /// takes it that 1.5 m about the climb are free.
 TEST(OpenWorld, NothingLiesWhereAFlightBeginsAndEnds) {
   const fs::path folder = fs::temp_directory_path() / "pade_open_world_room_test";
+  using K = OpenWorldKind;
+  // The first four had a stone there.
+  for (const auto& [kind, seed] :
+       {std::pair{K::rubble, 108}, std::pair{K::forest, 114}, std::pair{K::rubble, 120},
+        std::pair{K::building_site, 130}, std::pair{K::street, 101}}) {
+    const OpenWorld made = generate_open_world(kind, static_cast<std::uint64_t>(seed), 400);
+    ASSERT_TRUE(write_world(made.files, folder / "world.sdf").ok());
+    auto world = read_sdf(folder / "world.sdf");
+    ASSERT_TRUE(world.ok());
+    const Things things = things_of(std::move(world).value());
+    for (double climb = 0; climb <= 1.2; climb += 0.3)
+      EXPECT_GT(things.surface.to(made.start - climb * Vector3d::UnitZ()), 1.5)
+          << to_name(kind) << " " << seed;
+    EXPECT_GT(things.surface.to(made.goal), 1.5) << to_name(kind) << " " << seed;
+  }
+  fs::remove_all(folder);
+}
+
+/// The same by the files, for many seeds.
+TEST(OpenWorld, NoStoneReachesIntoTheRoomAboutStartAndGoal) {
+  constexpr double kReach = 0.6;  // of the mesh, at size 1
+  int stones = 0;
   for (const auto& [kind, name] : EnumNames<OpenWorldKind>::names) {
     for (std::uint64_t seed = 101; seed <= 140; ++seed) {
       const OpenWorld made = generate_open_world(kind, seed, 400);
-      ASSERT_TRUE(write_world(made.files, folder / "world.sdf").ok());
-      auto world = read_sdf(folder / "world.sdf");
-      ASSERT_TRUE(world.ok());
-      const Things things = things_of(std::move(world).value());
-      for (double climb = 0; climb <= 1.2; climb += 0.3)
-        EXPECT_GT(things.surface.to(made.start - climb * Vector3d::UnitZ()), 1.5) << name << " " << seed;
-      EXPECT_GT(things.surface.to(made.goal), 1.5) << name << " " << seed;
-      EXPECT_GT(things.surface.to(made.goal - 1.2 * Vector3d::UnitZ()), 1.5) << name << " " << seed;
+      const std::string& text = made.files.sdf;
+      for (auto at = text.find("meshes/stone"); at != std::string::npos;
+           at = text.find("meshes/stone", at + 1)) {
+        const char* const pose = text.c_str() + text.rfind("<pose>", at) + 6;
+        const char* const size = text.c_str() + text.find("<scale>", at) + 7;
+        char* next = nullptr;
+        const double x = std::strtod(pose, &next);
+        const double y = std::strtod(next, nullptr);
+        const double reach = kReach * std::strtod(size, nullptr);
+        ++stones;
+        EXPECT_GT(std::hypot(x, y) - reach, 2.4) << name << " " << seed;
+        EXPECT_GT(std::hypot(x - 60, y) - reach, 1.9) << name << " " << seed;
+      }
     }
   }
-  fs::remove_all(folder);
+  EXPECT_GT(stones, 10000);
 }
 
 }  // namespace

@@ -68,8 +68,9 @@ class OpenGenerator : Furniture {
 bool OpenGenerator::place(double half_width, double reach, Vector3d& foot) {
   for (int i = 0; i < 60; ++i) {
     foot = {random_.uniform(kWest, kEast), random_.uniform(-half_width, half_width), 0};
-    if (leaves_room(foot, reach) && std::none_of(taken_.begin(), taken_.end(),
-                             [&](const Vector3d& other) { return (other - foot).norm() < kApart; })) {
+    if (leaves_room(foot, reach) && std::none_of(taken_.begin(), taken_.end(), [&](const Vector3d& other) {
+          return (other - foot).norm() < kApart;
+        })) {
       taken_.push_back(foot);
       return true;
     }
