@@ -100,7 +100,10 @@ class Device {
       format.fmt.pix.height = static_cast<std::uint32_t>(camera.height);
       format.fmt.pix.pixelformat = wanted;
       format.fmt.pix.field = V4L2_FIELD_NONE;
-      if (ask(number_, VIDIOC_S_FMT, &format) < 0) continue;
+      if (ask(number_, VIDIOC_S_FMT, &format) < 0) {
+        if (errno == EBUSY) return Error{fmt::format("{}: is in use by another program", name)};
+        continue;
+      }
       format_ = format.fmt.pix;
       if (format_.pixelformat != wanted) continue;
       const bool size = format_.width == static_cast<std::uint32_t>(camera.width) &&
