@@ -37,6 +37,7 @@ struct NavigateArguments {
   std::string out;
   std::string gnss;
   std::string frames;
+  std::string topics;
   std::string imu = "industrial";
   std::string vehicle = "free";
   double rate = 10;
@@ -151,6 +152,7 @@ Result<CheckedLog> read_log(const NavigateArguments& arguments) {
   }
   io::NavigationLogOptions options;
   options.gnss = arguments.gnss;
+  options.topics = arguments.topics;
   return read_checked_log(arguments.log, options);
 }
 
@@ -218,11 +220,13 @@ void add_navigate(CLI::App& app, Context& context) {
   command
       ->add_option("log", arguments->log,
                    "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, a ground station's .tlog, "
-                   "or PX4's .ulg "
+                   "PX4's .ulg, a recording of ROS (.bag, .mcap, .db3) "
                    "(docs/formats.md); or raw GNSS: a file of RINEX 3 observations, UBX or libRSF ranges")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");
+  command->add_option("--topics", arguments->topics,
+                      "Topics of a recording that are meant where several fit, separated by blanks");
   command->add_option("--rate", arguments->rate, "Frames per second of relative_motion.csv")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
