@@ -13,7 +13,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pade/io/formats/map_files.hpp"
+#include "pade/io/sequence/sequence.hpp"
+#include "pade/live/recordings/session_recorder.hpp"
+
 #include "live/wall_camera.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace pade::live {
 namespace {
@@ -60,14 +65,13 @@ class Gatherer : public Sink {
 
 /// A session for some seconds.
 struct Bed {
-  explicit Bed(double rate) : camera(rate), poses(camera.zero) {
+  explicit Bed(double rate, InputSink* recorder = nullptr) : camera(rate), poses(camera.zero) {
     Pose mounting;
     mounting.rotation = Eigen::Quaterniond(forward_camera_rotation());
-    ObstacleMapperOptions mapper;
     mapper.map.voxel = 0.25;  // a pixel sees 5 cm of the wall
     SessionOptions options;
     options.velocity_sigma = 0.02;
-    auto made = Session::create({camera, poses, {&gatherer}, progress, mounting}, options, mapper);
+    auto made = Session::create({camera, poses, {&gatherer}, progress, mounting, recorder}, options, mapper);
     EXPECT_TRUE(made) << made.error().message;
     session = std::make_unique<Session>(std::move(*made));
   }
@@ -81,6 +85,7 @@ struct Bed {
     });
     return session->counts();
   }
+  ObstacleMapperOptions mapper;
   WallCamera camera;
   EastwardPoses poses;
   Gatherer gatherer;
@@ -193,6 +198,74 @@ TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
   });
   EXPECT_EQ(counts.restarts, 0U);
   EXPECT_FALSE(bed.session->map().bounds().isEmpty());
+}
+
+std::string bytes_of(const mapping::OccupancyMap& map) {
+  return io::bytes_of(io::encode_map(map, io::MapFormat::bt));
+}
+
+/// The map that a recording makes.
+std::string replayed(const std::filesystem::path& file, const ObstacleMapperOptions& options) {
+  const auto sequence = io::Sequence::open(file);
+  EXPECT_TRUE(sequence) << sequence.error().message;
+  if (!sequence) return {};
+  auto mapper = ObstacleMapper::create(sequence->camera(), options, sequence->mask());
+  EXPECT_TRUE(mapper);
+  for (std::size_t i = 0; i < sequence->size(); ++i) {
+    const auto frame = sequence->frame(i);
+    EXPECT_TRUE(frame) << frame.error().message;
+    if (frame) mapper->add(frame->image, frame->time, frame->T_world_camera, frame->motion_covariance);
+  }
+  return bytes_of(mapper->map());
+}
+
+TEST(SessionRecording, MakesTheSameMapAgain) {
+  const test::TemporaryFolder folder;
+  for (const char* const name : {"flight.mcap", "flight.bag"}) {
+    const WallCamera camera(10);  // as that of the bed
+    auto recorder = SessionRecorder::create(folder / name, camera.camera(), camera.mask());
+    ASSERT_TRUE(recorder) << recorder.error().message;
+    Bed bed(10, recorder->get());
+    const auto& counts = bed.run(2, [](double) {});
+    const Status finished = (*recorder)->finish();
+    ASSERT_TRUE(finished) << finished.error().message;
+    ASSERT_EQ((*recorder)->left_out(), 0U);
+    EXPECT_GT(counts.mapped, 8U);
+    EXPECT_EQ(replayed(folder / name, bed.mapper), bytes_of(bed.session->map())) << name;
+  }
+}
+
+TEST(SessionRecording, BeginsAnewWithTheMap) {
+  const test::TemporaryFolder folder;
+  const WallCamera camera(10);
+  auto recorder = SessionRecorder::create(folder / "flight.mcap", camera.camera(), camera.mask());
+  ASSERT_TRUE(recorder) << recorder.error().message;
+  Bed bed(10, recorder->get());
+  bed.run(2, [&](double elapsed) { bed.poses.jumped = elapsed > 1 ? 1 : 0; });
+  ASSERT_TRUE((*recorder)->finish());
+  EXPECT_EQ((*recorder)->file(), folder / "flight-2.mcap");
+  EXPECT_EQ(replayed(folder / "flight-2.mcap", bed.mapper), bytes_of(bed.session->map()));
+  EXPECT_TRUE(std::filesystem::exists(folder / "flight.mcap"));
+  EXPECT_EQ(folder.entries(), 2U);
+}
+
+TEST(SessionRecording, WithoutAFrameSaysSo) {
+  const test::TemporaryFolder folder;
+  auto recorder = SessionRecorder::create(folder / "flight.mcap", Camera{}, {});
+  ASSERT_TRUE(recorder);
+  const Status finished = (*recorder)->finish();
+  ASSERT_FALSE(finished);
+  EXPECT_THAT(finished.error().message, ::testing::HasSubstr("nothing was recorded"));
+  EXPECT_EQ(folder.entries(), 0U);
+}
+
+TEST(Session, SaysHowFarTheStampsAreOffOnceItIsCertain) {
+  EXPECT_EQ(stamp_text(std::nullopt), "");
+  EXPECT_EQ(stamp_text(StampOffset{-0.012, 0.004, 20}), "");  // three sigmas
+  EXPECT_EQ(stamp_text(StampOffset{0.003, 0.0001, 20}), "");  // too small to matter
+  EXPECT_EQ(stamp_text(StampOffset{-0.012, 0.0005, 20}),
+            "the images' stamps are 12.0 ms late (1 sigma 0.5 ms): add -0.0120 to session.time_offset");
+  EXPECT_THAT(stamp_text(StampOffset{0.02, 0.001, 20}), ::testing::HasSubstr("20.0 ms early"));
 }
 
 }  // namespace

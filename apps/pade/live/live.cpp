@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/config.hpp"
 #include "pade/live/map_saver.hpp"
+#include "pade/live/recordings/session_recorder.hpp"
 #include "pade/live/service.hpp"
 #include "pade/live/session.hpp"
 
@@ -147,7 +149,7 @@ void say(const std::string& text) { (void)std::fputs(text.c_str(), stderr); }
 class LiveLog {
  public:
   explicit LiveLog(live::PoseMessages poses) : poses_(poses) {}
-  void maybe(const live::Progress& progress, const live::LinkReport& link) {
+  void maybe(const live::Progress& progress, const live::LinkReport& link, const std::string& stamps) {
     constexpr double kPause = 5;  // s
     const Time now = live::now_of_ours();
     if (seconds_between(last_, now) < kPause) return;
@@ -159,6 +161,7 @@ class LiveLog {
     say(fmt::format("{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
                     live::text_of(link, poses_), age(progress.image), age(progress.depth), link.sectors_sent,
                     link.in.packets, link.in.bad, link.in.gaps));
+    if (!stamps.empty()) say(stamps + "\n");
   }
 
  private:
@@ -219,6 +222,15 @@ Status save_map(const live::Session& session, const live::SaverReport& meanwhile
   return {};
 }
 
+/// Where the recording is, or why there is none.
+std::string recorded(live::SessionRecorder& recorder) {
+  if (const Status finished = recorder.finish(); !finished) return finished.error().message + "\n";
+  const std::size_t lost = recorder.left_out();
+  return fmt::format(
+      "{}: the frames of the map{}\n", recorder.file().string(),
+      lost > 0 ? fmt::format(", without {} that the disk was too slow for", lost) : std::string());
+}
+
 Status run_live(const LiveArguments& arguments) {
   io::watch_for_interrupts();
   (void)std::signal(SIGHUP, SIG_IGN);  // a terminal out of radio range must not end the flight's map
@@ -232,9 +244,16 @@ Status run_live(const LiveArguments& arguments) {
   std::vector<live::Sink*> sinks{&sectors};
   std::optional<live::MapSaver> saver;
   if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
+  std::unique_ptr<live::SessionRecorder> recorder;
+  if (!options.record.empty()) {
+    const live::FrameSource& camera = *parts->camera.source;
+    auto made = live::SessionRecorder::create(options.record, camera.camera(), camera.mask());
+    if (!made) return made.error();
+    recorder = std::move(*made);
+  }
   auto session = live::Session::create(
-      {*parts->camera.source, *parts->link, sinks, progress, parts->camera.T_body_camera}, options.session,
-      options.mapper);
+      {*parts->camera.source, *parts->link, sinks, progress, parts->camera.T_body_camera, recorder.get()},
+      options.session, options.mapper);
   if (!session) return session.error();
   const live::ServiceManager service;
   {
@@ -244,7 +263,7 @@ Status run_live(const LiveArguments& arguments) {
     service.ready();
     const Time start = live::now_of_ours();
     session->run([&] {
-      log.maybe(progress, parts->link->report());
+      log.maybe(progress, parts->link->report(), live::stamp_text(session->stamp_offset()));
       pulse.maybe(*parts->link);
       const bool over =
           arguments.seconds > 0 && seconds_between(start, live::now_of_ours()) > arguments.seconds;
@@ -256,7 +275,11 @@ Status run_live(const LiveArguments& arguments) {
   live::SaverReport meanwhile;
   if (saver) meanwhile = saver->finish();
   const Status saved = save_map(*session, meanwhile, options.map);
-  (void)std::fputs(summary(session->counts(), parts->link->report()).c_str(), stdout);
+  std::string text = summary(session->counts(), parts->link->report());
+  if (const std::string stamps = live::stamp_text(session->stamp_offset()); !stamps.empty())
+    text += stamps + "\n";
+  if (recorder != nullptr) text += recorded(*recorder);
+  (void)std::fputs(text.c_str(), stdout);
   return saved;
 }
 
@@ -271,7 +294,7 @@ void add_live(CLI::App& app, Context& context) {
       "the autopilots' "
       "parameters "
       "and the file.\n"
-      "What does not exist yet: poses from our own filter, recording, OBSTACLE_DISTANCE_3D, "
+      "What does not exist yet: poses from our own filter, OBSTACLE_DISTANCE_3D, "
       "signing, RTSP "
       "and video\nfiles, ROS, DDS, Foxglove, a page.");
   command->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map")

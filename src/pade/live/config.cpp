@@ -37,6 +37,11 @@ Status check(const LiveOptions& options) {
   const bool known = options.map.empty() || options.map.ends_with(".bt") || options.map.ends_with(".ot");
   if (!known)
     return Error{fmt::format("map: found \"{}\", expected a name that ends in .bt or .ot", options.map)};
+  const bool recordable =
+      options.record.empty() || options.record.ends_with(".mcap") || options.record.ends_with(".bag");
+  if (!recordable)
+    return Error{
+        fmt::format("record: found \"{}\", expected a name that ends in .mcap or .bag", options.record)};
   return within("mapper", check(options.mapper));
 }
 

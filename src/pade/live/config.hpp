@@ -49,6 +49,7 @@ struct LiveOptions {
   ObstacleMapperOptions mapper;
   std::string map = "map.bt";  ///< where the map is saved; empty: nowhere
   double autosave = 10;        ///< s between one save and the next; 0: only at the end
+  std::string record;          ///< MCAP file of what is mapped; empty: none
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -59,6 +60,7 @@ struct LiveOptions {
     field("mapper", self.mapper, "depth and map");
     field("map", self.map, "file (.bt, .ot) that the map is saved to; empty: nowhere");
     field("autosave", self.autosave, "between one save and the next, s; 0 = only at the end");
+    field("record", self.record, "file (.mcap, .bag) that what is mapped is recorded in; empty: none");
   }
 };
 /// Refuses numbers that make no sense (core/option_check.hpp).

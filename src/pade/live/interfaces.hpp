@@ -66,6 +66,27 @@ struct LiveUpdate {
   double depth_share = 0;                        ///< of the pixels that have a depth
 };
 
+/// A frame as it goes into the mapper.
+struct MapperInput {
+  cv::Mat image;  ///< as LiveFrame::image
+  Time time;
+  Pose T_world_camera;
+  Matrix6d covariance;  ///< of the motion since the frame before (Frame::motion_covariance)
+};
+
+/// Takes what is mapped. Called by the mapper's thread, so it must not wait.
+class InputSink {
+ public:
+  InputSink() = default;
+  InputSink(const InputSink&) = delete;
+  InputSink& operator=(const InputSink&) = delete;
+  virtual ~InputSink() = default;
+
+  virtual void take(const MapperInput& input) = 0;
+  /// The poses have jumped: what comes now is another map.
+  virtual void begin_anew() = 0;
+};
+
 /// Takes results. Called by the mapper's thread, so it must not wait.
 class Sink {
  public:

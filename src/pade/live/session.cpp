@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <limits>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include <fmt/format.h>
 #include <opencv2/core.hpp>
 
 #include "pade/core/option_check.hpp"
@@ -119,6 +121,14 @@ void SectorSink::take(const LiveUpdate& update) {
   link_.offer(message, update.time);
 }
 
+std::string stamp_text(const std::optional<StampOffset>& offset) {
+  if (!offset || !offset->is_certain()) return {};
+  return fmt::format(
+      "the images' stamps are {:.1f} ms {} (1 sigma {:.1f} ms): add {:.4f} to session.time_offset",
+      1e3 * std::abs(offset->seconds), offset->seconds < 0 ? "late" : "early", 1e3 * offset->sigma,
+      offset->seconds);
+}
+
 Result<Session> Session::create(const SessionParts& parts, const SessionOptions& options,
                                 const ObstacleMapperOptions& mapper) {
   auto made = ObstacleMapper::create(parts.camera.camera(), mapper, parts.camera.mask());
@@ -212,6 +222,7 @@ void Session::begin_anew() {
   if (!made) return;  // as at the start, where it was possible
   mapper_ = std::move(*made);
   view_.reset();
+  if (parts_.recorder != nullptr) parts_.recorder->begin_anew();
   counts_.mapped_anew = 0;
   ++counts_.restarts;
   for (Sink* const sink : parts_.sinks) sink->begin_anew();
@@ -222,8 +233,10 @@ void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
   const double way = options_.velocity_sigma * std::clamp(seconds_between(last_, frame.time), 0.0, 1.0);
   covariance.diagonal().head<3>().setConstant(way * way);
   covariance.diagonal().tail<3>().setConstant(options_.rotation_sigma * options_.rotation_sigma);
-  const MapperUpdate& update =
-      mapper_.add(frame.image, frame.time, camera_pose(T_world_body, parts_.T_body_camera), covariance);
+  const Pose T_world_camera = camera_pose(T_world_body, parts_.T_body_camera);
+  if (parts_.recorder != nullptr)
+    parts_.recorder->take({frame.image, frame.time, T_world_camera, covariance});
+  const MapperUpdate& update = mapper_.add(frame.image, frame.time, T_world_camera, covariance);
   if (update.outcome == MapperUpdate::Outcome::skipped) {
     if (view_ && !update.change.touched.empty())
       view_ = view_->after(mapper_.map(), update.change);                      // what it forgot

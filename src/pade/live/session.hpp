@@ -4,9 +4,12 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "pade/core/health.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
@@ -72,9 +75,14 @@ struct SessionParts {
   FrameSource& camera;
   const NavigationSource& poses;
   std::vector<Sink*> sinks;
-  Progress& progress;  ///< written here, read by a link
-  Pose T_body_camera;  ///< mounting of the camera
+  Progress& progress;             ///< written here, read by a link
+  Pose T_body_camera;             ///< mounting of the camera
+  InputSink* recorder = nullptr;  ///< what is mapped goes there as well
 };
+
+/// "the images' stamps are 12.0 ms late (1 sigma 0.5 ms): add -0.0120 to session.time_offset" if that is
+/// certain, else empty.
+std::string stamp_text(const std::optional<StampOffset>& offset);
 
 /// Owns the mapper. One thread but where it says otherwise.
 class Session {
@@ -89,6 +97,10 @@ class Session {
 
   [[nodiscard]] const mapping::OccupancyMap& map() const { return mapper_.map(); }
   [[nodiscard]] const SessionCounts& counts() const { return counts_; }
+  /// What the images say of their stamps against those of the poses.
+  [[nodiscard]] const std::optional<StampOffset>& stamp_offset() const {
+    return mapper_.health().stamp_offset;
+  }
 
  private:
   Session(const SessionParts& parts, const SessionOptions& options, const ObstacleMapperOptions& mapper,
