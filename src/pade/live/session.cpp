@@ -94,8 +94,13 @@ void thin_out(std::vector<LiveFrame>& waiting, Time newest) {
 
 double share_with_depth(const DepthImage& image) {
   if (image.empty()) return 0;
-  const double pixels = static_cast<double>(image.depth.total());
-  return cv::countNonZero(image.depth == image.depth) / pixels;  // NaN is not equal to itself
+  std::size_t known = 0;
+  for (int v = 0; v < image.depth.rows; ++v) {
+    const auto* row = image.depth.ptr<float>(v);
+    known += static_cast<std::size_t>(
+        std::count_if(row, row + image.depth.cols, [](float depth) { return !std::isnan(depth); }));
+  }
+  return static_cast<double>(known) / static_cast<double>(image.depth.total());
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ void AutopilotLink::say(std::uint8_t severity, std::string_view text) {
 }
 
 void AutopilotLink::step(Time now, const Progress& progress) {
-  std::array<std::uint8_t, 2048> bytes;
+  std::array<std::uint8_t, 2048> bytes{};
   const std::lock_guard lock(mutex_);
   constexpr int kMostReads = 64;  // so that a flood of bytes does not keep anything from being sent
   for (int i = 0; i < kMostReads; ++i) {
