@@ -148,7 +148,9 @@ function lineOf(topic, m) {
   if (m.data) return head + m.format + " " + crypto.createHash("sha256").update(m.data).digest("hex");
   if (m.k ?? m.K) return head + `${m.width} ${m.height} ${m.distortion_model} ${bits(m.d ?? m.D)} ${bits(m.k ?? m.K)}`;
   const { position: p, orientation: q } = m.pose.pose;
-  return head + m.child_frame_id + " " + bits([p.x, p.y, p.z]) + " " + [q.x, q.y, q.z, q.w].map((v) => v.toFixed(12)).join(",");
+  const turn = [q.x, q.y, q.z, q.w];
+  const norm = Math.hypot(...turn); // ours are of unit length
+  return head + m.child_frame_id + " " + bits([p.x, p.y, p.z]) + " " + turn.map((v) => (v / norm).toFixed(10)).join(",");
 }
 const wanted = new Set(["/camera/camera_info", "/camera/image_raw/compressed", "/odom"]);
 

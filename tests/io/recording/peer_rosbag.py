@@ -83,8 +83,10 @@ def line_of(topic, message):
         return head + "%d %d %s %s %s" % (message.width, message.height, message.distortion_model, bits(message.D),
                                           bits(message.K))
     place, turn = message.pose.pose.position, message.pose.pose.orientation
+    turn = (turn.x, turn.y, turn.z, turn.w)
+    norm = sum(value * value for value in turn) ** 0.5  # ours are of unit length
     return head + message.child_frame_id + " " + bits((place.x, place.y, place.z)) + " " + ",".join(
-        "%.12f" % value for value in (turn.x, turn.y, turn.z, turn.w))
+        "%.10f" % (value / norm) for value in turn)
 
 
 def read(path):
