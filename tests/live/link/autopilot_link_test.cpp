@@ -61,7 +61,18 @@ class Bench {
       const std::int64_t ms = now_.nanoseconds / kMillisecond;
       const auto boot = static_cast<std::uint32_t>(ms - 1'000'000);
       if (heartbeat && ms % 1000 == 0) tell(mavlink::Heartbeat{2, 12, 0, 0, 4, 3});
-      if (poses && ms % 20 == 0) tell(mavlink::AttitudeQuaternion{boot, 1, 0, 0, 0, 0, 0, 0, {}});
+      if (poses && ms % 20 == 0) {
+        const double half = 0.5e-3 * turn_rate * static_cast<double>(ms % 1'000'000);
+        tell(mavlink::AttitudeQuaternion{boot,
+                                         static_cast<float>(std::cos(half)),
+                                         0,
+                                         0,
+                                         static_cast<float>(std::sin(half)),
+                                         0,
+                                         0,
+                                         static_cast<float>(turn_rate),
+                                         {}});
+      }
       if (poses && positions && ms % 30 == 0) {
         tell(mavlink::LocalPositionNed{boot, 0.002F * static_cast<float>(boot), 0, -5, 2, 0, 0});
       }
@@ -81,7 +92,10 @@ class Bench {
         heartbeats.push_back({now_, m->system_status});
       if (const auto m = mavlink::unpack<mavlink::StatusText>(frame))
         texts.emplace_back(now_, m->text.data());
-      if (mavlink::unpack<mavlink::ObstacleDistance>(frame)) sectors.push_back(now_);
+      if (const auto m = mavlink::unpack<mavlink::ObstacleDistance>(frame)) {
+        sectors.push_back(now_);
+        last_sectors = *m;
+      }
       if (const auto m = mavlink::unpack<mavlink::CommandLong>(frame)) {
         commands.push_back(*m);
         tell(mavlink::CommandAck{m->command, ack});
@@ -98,6 +112,8 @@ class Bench {
   bool heartbeat = true, poses = true, questions = false, answers = true;
   bool camera = true, mapper = true, depth = true, positions = true;
   std::uint8_t ack = 0;
+  double turn_rate = 0;  ///< clockwise, rad/s
+  mavlink::ObstacleDistance last_sectors;
 
   /// What we sent, by time.
   struct Said {
@@ -230,6 +246,28 @@ TEST(AutopilotLink, SectorsAreSentOnceAndNeverOld) {
   bench.run(1);
   EXPECT_EQ(bench.sectors.size(), 1U);
   EXPECT_EQ(bench.link().report().sectors_stale, 1U);
+}
+
+/// A message is a tenth of a second old or two, in which a vehicle turns by several bins: receivers take it
+/// for now.
+TEST(AutopilotLink, SectorsAreTurnedToTheHeadingAtWhichTheyLeave) {
+  for (const double degrees : {0.0, 60.0, -100.0}) {
+    Bench bench;
+    bench.turn_rate = degrees * std::numbers::pi / 180;
+    bench.run(5);
+    mavlink::ObstacleDistance message;
+    message.increment = 5;
+    message.distances.fill(65535);
+    message.distances[3] = 250;
+    bench.link().offer(message, {bench.now().nanoseconds - 250 * kMillisecond});
+    bench.run(0.01);
+    ASSERT_EQ(bench.sectors.size(), 1U);
+    const auto found =
+        std::find(bench.last_sectors.distances.begin(), bench.last_sectors.distances.end(), 250);
+    const auto bin = found - bench.last_sectors.distances.begin();
+    // Clockwise by 15 degrees: what was 15 degrees to the right is ahead.
+    EXPECT_EQ(bin, (72 + 3 - std::lround(degrees * 0.25 / 5)) % 72) << degrees;
+  }
 }
 
 /// Receivers would take sectors that say nothing for a sign of health.

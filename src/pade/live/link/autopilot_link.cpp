@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -133,11 +136,24 @@ void AutopilotLink::ask(Time now) {
   }
 }
 
+/// The sectors are those of the exposure, the receiver takes them for those of now. Whole bins: between them
+/// the rule that no obstacle is lost would not hold.
+void AutopilotLink::turn_to_newest_heading(mavlink::ObstacleDistance& sectors, Time frame) const {
+  const auto theirs = clock_.to_autopilot(frame);
+  if (!theirs || sectors.increment == 0) return;
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  const auto bins =
+      static_cast<std::ptrdiff_t>(std::lround(kDegrees * poses_.turned_since(*theirs) / sectors.increment));
+  const auto count = static_cast<std::ptrdiff_t>(sectors.distances.size());
+  std::rotate(sectors.distances.begin(), sectors.distances.begin() + ((bins % count) + count) % count,
+              sectors.distances.end());
+}
+
 void AutopilotLink::send_sectors(Time now) {
   if (!offered_) return;
   if (seconds_between(offered_frame_, now) > kOldest) {
     ++report_.sectors_stale;
-  } else if (send(*offered_)) {
+  } else if (turn_to_newest_heading(*offered_, offered_frame_); send(*offered_)) {
     ++report_.sectors_sent;
     progress_.sent = offered_frame_.nanoseconds;
   }

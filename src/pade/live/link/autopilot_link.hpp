@@ -87,6 +87,7 @@ class AutopilotLink : public NavigationSource {
   void take_timesync(const mavlink::Frame& frame, Time now);
   void ask(Time now);
   void send_sectors(Time now);
+  void turn_to_newest_heading(mavlink::ObstacleDistance& sectors, Time frame) const;
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);
   void send_heartbeat(std::uint8_t state);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
@@ -154,6 +155,17 @@ PoseAnswer AutopilotPoses::at(Time time) const {
   answer.T_world_body.translation =
       place.share < 1 ? Vector3d((1 - place.share) * positions_[place.after - 1].value + place.share * p) : p;
   return answer;
+}
+
+double AutopilotPoses::turned_since(Time time) const {
+  const Bracket then = bracket(attitudes_, time);
+  if (then.kind != PoseAnswer::Kind::valid) return 0;
+  const auto heading = [](const Quaterniond& rotation) {
+    const Vector3d ahead = rotation * Vector3d::UnitX();
+    return std::atan2(ahead.y(), ahead.x());
+  };
+  return std::remainder(heading(attitudes_[then.after].value) - heading(attitudes_.back().value),
+                        2 * std::numbers::pi);
 }
 
 Time AutopilotPoses::newest() const {

@@ -50,6 +50,9 @@ class AutopilotPoses {
   [[nodiscard]] std::size_t jumps() const { return jumps_; }
   [[nodiscard]] std::size_t attitudes() const { return attitudes_come_; }  ///< that came
   [[nodiscard]] std::size_t positions() const { return positions_come_; }  ///< that came
+  /// How far the body has turned from a time to the newest attitude, clockwise seen from above, rad; 0 where
+  /// that is not known.
+  [[nodiscard]] double turned_since(Time time) const;
   /// Of the newest pose that can be answered; the start of time if there is none.
   [[nodiscard]] Time newest() const;
 
