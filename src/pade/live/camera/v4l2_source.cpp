@@ -150,7 +150,7 @@ class Device {
     return {};
   }
 
-  [[nodiscard]] cv::Mat decoded(void* start, std::size_t bytes) const {
+  [[nodiscard]] static cv::Mat decoded(void* start, std::size_t bytes) {
     constexpr std::size_t kShortest = 8;  // fewer hold no header; cameras on a busy bus give none at all
     if (bytes < kShortest) return {};
     try {  // OpenCV throws on sizes it refuses and on allocation
