@@ -160,7 +160,8 @@ Result<std::optional<RawInput>> take_raw_gnss(const NavigateArguments& arguments
   log.gnss.fixes.clear();
   log.gnss.velocities.clear();
   log.gnss.origin = input->origin;
-  std::erase_if(log.remarks, [](const std::string& r) { return r.find("no GNSS log found") != std::string::npos; });
+  std::erase_if(log.remarks,
+                [](const std::string& r) { return r.find("no GNSS log found") != std::string::npos; });
   log.remarks.push_back(input->remark);
   log.remarks.insert(log.remarks.end(), input->log.remarks.begin(), input->log.remarks.end());
   return std::optional<RawInput>(std::move(*input));
@@ -248,9 +249,11 @@ Status navigate(const NavigateArguments& arguments) {
                sensor.sensor, sensor.measurements, sensor.refused, sensor.chi_square);
   }
   if (*raw && arguments.raw_coupling == "tight") {
-    fmt::print("satellite by satellite, used / refused: ranges {} / {}, rates {} / {}, phases {} / {}; the clock jumped {} times\n",
-               run.raw.ranges.used, run.raw.ranges.refused, run.raw.rates.used, run.raw.rates.refused,
-               run.raw.phases.used, run.raw.phases.refused, run.raw.clock_jumps);
+    fmt::print(
+        "satellite by satellite, used / refused: ranges {} / {}, rates {} / {}, phases {} / {}; the clock "
+        "jumped {} times\n",
+        run.raw.ranges.used, run.raw.ranges.refused, run.raw.rates.used, run.raw.rates.refused,
+        run.raw.phases.used, run.raw.phases.refused, run.raw.clock_jumps);
   }
   if (score) {
     fmt::print(
@@ -334,10 +337,12 @@ void add_navigate(CLI::App& app, Context& context) {
           "FLOAT in [0 - 60]"));
   command
       ->add_option("--raw-coupling", arguments->raw_coupling,
-                   "Raw GNSS beside the IMU in place of gnss.csv: tight, each satellite for itself (docs/navigation.md, "
+                   "Raw GNSS beside the IMU in place of gnss.csv: tight, each satellite for itself "
+                   "(docs/navigation.md, "
                    "section 7), or loose, the positions and velocities that come of each epoch")
       ->check(CLI::IsMember({"loose", "tight"}));
-  command->add_option("--raw-gnss", arguments->raw_gnss, "Where that raw GNSS is, if not in the folder of the log");
+  command->add_option("--raw-gnss", arguments->raw_gnss,
+                      "Where that raw GNSS is, if not in the folder of the log");
   command->add_flag("--force", arguments->force, "Replace an earlier output");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->callback([arguments, &context] {

@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kWeek = 604800 * kSecond;
-constexpr std::int64_t kGpsOfUnix = 315964800 * kSecond;  // Unix time of the start of GPS time, less leap seconds
+constexpr std::int64_t kGpsOfUnix =
+    315964800 * kSecond;  // Unix time of the start of GPS time, less leap seconds
 
 struct Scale {
   const char* name;
@@ -45,25 +46,26 @@ Result<RawInput> read_raw_input(const std::filesystem::path& path, const std::ve
   auto log = io::read_raw_gnss(path);
   if (!log) return log.error();
   if (log->epochs.empty()) {
-    return Error{fmt::format("{}: found ranges without Doppler, expected RINEX 3 observations or UBX",
-                             path.string())};
+    return Error{
+        fmt::format("{}: found ranges without Doppler, expected RINEX 3 observations or UBX", path.string())};
   }
   if (imu.empty()) return Error{fmt::format("{}: found no IMU samples beside it", path.string())};
   const Span raw{log->epochs.front().time.nanoseconds, log->epochs.back().time.nanoseconds};
   const Time first{raw.first};
-  const std::array scales{
-      Scale{"GPS time", Time{0}}, Scale{"seconds of the GPS week", Time{raw.first - raw.first % kWeek}},
-      Scale{"Unix time", Time{io::leap_seconds(first) * kSecond - kGpsOfUnix}}};
+  const std::array scales{Scale{"GPS time", Time{0}},
+                          Scale{"seconds of the GPS week", Time{raw.first - raw.first % kWeek}},
+                          Scale{"Unix time", Time{io::leap_seconds(first) * kSecond - kGpsOfUnix}}};
   const Span samples = span_of(imu);
   const auto best = std::max_element(scales.begin(), scales.end(), [&](const Scale& a, const Scale& b) {
     return overlap(samples, raw, a.zero) < overlap(samples, raw, b.zero);
   });
   if (overlap(samples, raw, best->zero) <= 0) {
-    return Error{fmt::format(
-        "{}: found IMU stamps from {} to {} s and raw GNSS from {} to {} s of GPS time, expected that they overlap in GPS "
-        "time, seconds of the GPS week, or Unix time",
-        path.string(), to_string(imu.front().time), to_string(imu.back().time), to_string(first),
-        to_string(Time{raw.last}))};
+    return Error{
+        fmt::format("{}: found IMU stamps from {} to {} s and raw GNSS from {} to {} s of GPS time, expected "
+                    "that they overlap in GPS "
+                    "time, seconds of the GPS week, or Unix time",
+                    path.string(), to_string(imu.front().time), to_string(imu.back().time), to_string(first),
+                    to_string(Time{raw.last}))};
   }
   RawInput input;
   input.log = std::move(*log);

@@ -21,9 +21,9 @@ struct RawInput {
   std::string remark;     ///< which time scale the IMU was found to have
 };
 
-/// Reads the raw GNSS of a folder or file (io::read_raw_gnss). The IMU's stamps may be GPS time, seconds of the GPS
-/// week, or Unix time: of these the one by which the two recordings overlap. Errors: those of the reader; no
-/// overlap; known ranges, which have no Doppler; no position.
+/// Reads the raw GNSS of a folder or file (io::read_raw_gnss). The IMU's stamps may be GPS time, seconds of
+/// the GPS week, or Unix time: of these the one by which the two recordings overlap. Errors: those of the
+/// reader; no overlap; known ranges, which have no Doppler; no position.
 Result<RawInput> read_raw_input(const std::filesystem::path& path, const std::vector<ImuSample>& imu,
                                 const gnss::PositioningOptions& options);
 

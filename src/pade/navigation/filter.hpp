@@ -66,8 +66,7 @@ struct FilterCore {
 /// What is kept to come back to: everything but clones.
 struct FilterSnapshot : FilterCore {
   /// Of the 22 errors, and the 9 of raw GNSS if it is expected.
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostCommon, kMostCommon> P =
-      BaseMatrix::Zero();
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostCommon, kMostCommon> P = BaseMatrix::Zero();
 };
 
 /// Motion of the body between two clones or a clone and now.
@@ -111,8 +110,8 @@ class Filter {
   Innovation update(const ZeroVelocity& stop);
   Innovation update(const RangeToGround& range);
   Innovation update(const RoadMotion& road);
-  /// Every satellite for itself. Before watch(), position and velocity of the epoch instead, if it has them. The
-  /// innovation is that of the velocity from Doppler.
+  /// Every satellite for itself. Before watch(), position and velocity of the epoch instead, if it has them.
+  /// The innovation is that of the velocity from Doppler.
   Innovation update(const RawEpoch& epoch);
   /// Levelling: the mean specific force of a body known to be unaccelerated.
   Innovation update_static_force(const Vector3d& force, double sigma);

@@ -56,12 +56,12 @@ struct FilterOptions {
   double iron_correlation_time = 600;  ///< s
 
   // Raw GNSS (docs/navigation.md, section 7). A clock of temperature-compensated quartz.
-  bool raw_gnss = false;           ///< raw epochs are expected, in place of positions and velocities
-  double clock_noise = 0.1;        ///< of the clock, m/sqrt(s)
-  double clock_drift_walk = 0.2;   ///< of its drift, m/s/sqrt(s)
-  double raw_bias_sigma = 1;       ///< what all ranges together are wrong by for minutes, per axis, m
-  double raw_gate = 4;             ///< sigmas beyond which a measurement of a satellite is not used
-  double phase_anchor_time = 1;    ///< phases are counted from one epoch for so long, s
+  bool raw_gnss = false;          ///< raw epochs are expected, in place of positions and velocities
+  double clock_noise = 0.1;       ///< of the clock, m/sqrt(s)
+  double clock_drift_walk = 0.2;  ///< of its drift, m/s/sqrt(s)
+  double raw_bias_sigma = 1;      ///< what all ranges together are wrong by for minutes, per axis, m
+  double raw_gate = 4;            ///< sigmas beyond which a measurement of a satellite is not used
+  double phase_anchor_time = 1;   ///< phases are counted from one epoch for so long, s
 
   // Robustness.
   double gate_probability_3 = 16.27;  ///< chi-square bound of 3 degrees of freedom (99.9 %)

@@ -20,9 +20,10 @@ inline constexpr int kHeightBias = 18;
 inline constexpr int kIron = 19;
 inline constexpr int kBase = 22;
 
-// Behind them, if raw GNSS is expected (tight/raw_state.hpp): the receiver's clock and its drift, in metres of GPS's
-// time and m/s; what the signals of GLONASS, Galileo and BeiDou are late against GPS's, m; and a copy of the
-// antenna's position (ENU) and of the clock at the epoch from which the carriers' phases are counted. All additive.
+// Behind them, if raw GNSS is expected (tight/raw_state.hpp): the receiver's clock and its drift, in metres
+// of GPS's time and m/s; what the signals of GLONASS, Galileo and BeiDou are late against GPS's, m; and a
+// copy of the antenna's position (ENU) and of the clock at the epoch from which the carriers' phases are
+// counted. All additive.
 inline constexpr int kClock = 22;
 inline constexpr int kDrift = 23;
 inline constexpr int kSystemBias = 24;

@@ -21,10 +21,10 @@ struct RawCounts {
 
 /// What became of raw GNSS.
 struct RawTally {
-  RawCounts ranges;                 ///< pseudoranges
-  RawCounts rates;                  ///< from Doppler
-  RawCounts phases;                 ///< changes of the carriers' phases
-  std::uint64_t clock_jumps = 0;    ///< of the receiver's clock, by whole milliseconds
+  RawCounts ranges;               ///< pseudoranges
+  RawCounts rates;                ///< from Doppler
+  RawCounts phases;               ///< changes of the carriers' phases
+  std::uint64_t clock_jumps = 0;  ///< of the receiver's clock, by whole milliseconds
 };
 
 /// What became of a measurement.

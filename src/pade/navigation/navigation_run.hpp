@@ -19,8 +19,9 @@ struct NavigationRunOptions {
   double rate = 10;                ///< Hz
   Pose T_body_camera;              ///< of the motions; the trajectory is the body's
   std::optional<Heading> heading;  ///< a yaw known at the start
-  std::vector<std::shared_ptr<const navigation::RawEpoch>> raw;  ///< raw GNSS beside the log's own; none is null
-  bool on_road = false;            ///< a vehicle on wheels, which moves along its x axis only
+  std::vector<std::shared_ptr<const navigation::RawEpoch>>
+      raw;               ///< raw GNSS beside the log's own; none is null
+  bool on_road = false;  ///< a vehicle on wheels, which moves along its x axis only
 };
 
 /// The state at one frame.

@@ -20,7 +20,7 @@ struct ReplayOptions {
   std::uint64_t seed = 1;         ///< of the delays
   std::vector<Heading> headings;  ///< further measurements
   std::vector<std::shared_ptr<const RawEpoch>> raw;  ///< raw GNSS, in any order; none is null
-  double road_rate = 0;           ///< RoadMotion so many times a second: a vehicle on wheels, Hz
+  double road_rate = 0;  ///< RoadMotion so many times a second: a vehicle on wheels, Hz
 };
 
 /// Calls `after_imu(stamp)` behind each IMU sample. At one moment aiding data arrives before the IMU sample.

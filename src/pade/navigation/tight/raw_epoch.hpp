@@ -16,7 +16,7 @@ namespace pade::navigation {
 /// what the Earth turns while the signal travels.
 struct RawSatellite {
   gnss::SatelliteId satellite;
-  std::array<char, 2> code{'1', 'C'};   ///< RINEX's band and attribute of the signal
+  std::array<char, 2> code{'1', 'C'};    ///< RINEX's band and attribute of the signal
   Vector3d position = Vector3d::Zero();  ///< when the signal left it, m
   Vector3d velocity = Vector3d::Zero();  ///< by which the distance to a place at rest changes, m/s
   std::optional<double> range;           ///< distance and the receiver's clock, m

@@ -13,9 +13,9 @@ enum class RawKind : std::uint8_t { range, rate, phase };
 /// A measurement of one satellite, linearised.
 struct RawEquation {
   RawKind kind = RawKind::range;
-  std::size_t anchored = 0;   ///< of a phase: its place among those at the anchor
-  double residual = 0;        ///< measured less predicted
-  double variance = 1;        ///< of the measurement
+  std::size_t anchored = 0;  ///< of a phase: its place among those at the anchor
+  double residual = 0;       ///< measured less predicted
+  double variance = 1;       ///< of the measurement
   RawRow row = RawRow::Zero();
   RawRow spread = RawRow::Zero();  ///< covariance of the variables times `row`
   bool used = true;
@@ -35,22 +35,23 @@ struct RawEquations {
   [[nodiscard]] std::size_t count(RawKind kind, bool used_only) const;
 };
 
-/// The Kalman update of variables of prior covariance S by scalar measurements, one by one, in a form that lifts to
-/// any state x with cov(x, variables) = C: x <- x + C mean, P <- P - C gain C^T.
+/// The Kalman update of variables of prior covariance S by scalar measurements, one by one, in a form that
+/// lifts to any state x with cov(x, variables) = C: x <- x + C mean, P <- P - C gain C^T.
 struct RawInformation {
   RawMatrix gain = RawMatrix::Zero();
   RawRow mean = RawRow::Zero();
 
   void add(const RawEquation& equation);
-  /// The residual that is left of a measurement that was added, over its own standard deviation.
-  [[nodiscard]] double left_over(const RawEquation& equation) const;
+  /// The residual that is left of a measurement that was added, over its own standard deviation; 0 if it is
+  /// surely below `least`, or if nearly all of the measurement went into the variables.
+  [[nodiscard]] double left_over(const RawEquation& equation, double least) const;
 };
 
 /// That of the measurements that are used; `spread` must be filled in.
 RawInformation combined(const RawEquations& equations);
 
-/// Marks those that do not fit as not used: first each one against the prior, then, while one is beyond the gate
-/// given the prior and all others, the worst.
+/// Marks those that do not fit as not used: first each one against the prior, then, while one is beyond the
+/// gate given the prior and all others, the worst.
 /// @param S  prior covariance of the variables; `spread` of the equations is filled in
 RawInformation fit(RawEquations& equations, const RawMatrix& S, double gate);
 

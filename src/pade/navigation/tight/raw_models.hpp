@@ -7,7 +7,8 @@
 
 namespace pade::navigation {
 
-// The variables: antenna's position, velocity, common bias of the ranges, then the nine errors of the receiver.
+// The variables: antenna's position, velocity, common bias of the ranges, then the nine errors of the
+// receiver.
 inline constexpr int kOfPosition = 0;
 inline constexpr int kOfVelocity = 3;
 inline constexpr int kOfBias = 6;

@@ -7,8 +7,8 @@
 namespace pade::navigation {
 namespace {
 
-// Directions and delays are taken from one place until the antenna is so far from it, m: delays that followed each
-// position would move with its errors, and the phases with them.
+// Directions and delays are taken from one place until the antenna is so far from it, m: delays that followed
+// each position would move with its errors, and the phases with them.
 constexpr double kNear = 100;
 
 }  // namespace
@@ -38,8 +38,8 @@ void RawObserver::add_fix(std::span<gnss::SatelliteView> views, const gnss::Posi
 
 RawSatellite RawObserver::satellite_of(const gnss::SatelliteView& view) const {
   const gnss::Signal& signal = *view.signal;
-  // In the frame of the moment of reception: the Earth turns while the signal is under way, and for longer the farther
-  // the satellite is.
+  // In the frame of the moment of reception: the Earth turns while the signal is under way, and for longer
+  // the farther the satellite is.
   const double distance = (view.state.position - *near_).norm();
   const double angle = gnss::kEarthRate * distance / gnss::kSpeedOfLight;
   const Eigen::AngleAxisd turn(-angle, Vector3d::UnitZ());
@@ -59,8 +59,7 @@ RawSatellite RawObserver::satellite_of(const gnss::SatelliteView& view) const {
     s.rate = -view.wavelength * *signal.doppler + gnss::kSpeedOfLight * view.state.clock_rate;
   }
   if (signal.carrier) {
-    s.phase =
-        view.wavelength * *signal.carrier + gnss::kSpeedOfLight * view.state.clock - view.air_of_phase;
+    s.phase = view.wavelength * *signal.carrier + gnss::kSpeedOfLight * view.state.clock - view.air_of_phase;
   }
   const gnss::ViewSigmas sigmas = gnss::sigmas_of(view, true, options_);
   s.range_sigma = sigmas.range;
@@ -74,7 +73,8 @@ RawSatellite RawObserver::satellite_of(const gnss::SatelliteView& view) const {
 std::shared_ptr<const RawEpoch> RawObserver::observe(const gnss::Epoch& epoch) {
   auto views = gnss::views_of(epoch, *broadcast_, options_);
   const gnss::Atmosphere air{epoch.time, broadcast_->ionosphere};
-  const auto fix = gnss::locate(views, air, options_, near_);
+  const auto fix = gnss::locate(views, air, options_, last_);
+  if (fix) last_ = fix->position;
   if (fix && (!near_ || (fix->position - *near_).norm() > kNear)) near_ = fix->position;
   if (!near_) return nullptr;
   if (!frame_) frame_ = LocalFrame::at(gnss::geodetic_of(*near_));

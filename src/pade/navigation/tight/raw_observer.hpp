@@ -12,9 +12,9 @@ namespace pade::navigation {
 
 /// Where the local frame lies on the Earth.
 struct LocalFrame {
-  Vector3d origin = Vector3d::Zero();            ///< ECEF, m
-  Matrix3d R_enu_ecef = Matrix3d::Identity();    ///< gnss::enu_axes() of the origin
-  gnss::Geodetic place;                          ///< the origin once more
+  Vector3d origin = Vector3d::Zero();          ///< ECEF, m
+  Matrix3d R_enu_ecef = Matrix3d::Identity();  ///< gnss::enu_axes() of the origin
+  gnss::Geodetic place;                        ///< the origin once more
 
   static LocalFrame at(const gnss::Geodetic& place);
   static LocalFrame at(const GeodeticOrigin& origin);
@@ -42,6 +42,7 @@ class RawObserver {
   gnss::PositioningOptions options_;
   std::optional<LocalFrame> frame_;
   Time zero_;
+  std::optional<Vector3d> last_;  ///< position that was found, ECEF, m
   std::optional<Vector3d> near_;  ///< ECEF, m; where directions and delays are taken from
 };
 

@@ -1,5 +1,5 @@
-// Raw GNSS in the filter: the receiver's clock, each satellite's range, rate and phase, and the anchor from which
-// phases are counted (docs/navigation.md, section 7).
+// Raw GNSS in the filter: the receiver's clock, each satellite's range, rate and phase, and the anchor from
+// which phases are counted (docs/navigation.md, section 7).
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -13,8 +13,11 @@ constexpr double kJump = 1e-3 * gnss::kSpeedOfLight;  // clocks jump by whole mi
 constexpr double kFirstClockSigma = 30;               // of a clock taken from a median of ranges, m
 constexpr double kFirstDriftSigma = 3;                // likewise, m/s
 constexpr double kVerticalBias = 1.6;                 // of the common bias, against the horizontal one
-constexpr std::size_t kLeastJudges = 5;   // satellites whose majority can tell that the filter is wrong
+constexpr std::size_t kLeastJudges = 5;  // satellites whose majority can tell that the filter is wrong
 constexpr std::size_t kLeastForFix = 4;
+// Doppler comes of the loop that follows the phase: beside a phase it is not news of its own, and counts
+// less.
+constexpr double kBesidePhase = 3;
 constexpr int kLeastContradictions = 3;  // in a row, before the satellites are believed against the filter
 
 /// Finite values whose middle one is asked for.
@@ -190,9 +193,11 @@ void Filter::collect(const RawEpoch& epoch, RawEquations& equations) const {
     return &e;
   };
   for (const RawSatellite& s : satellites_of(epoch)) {
-    if (s.rate) add(RawKind::rate, *s.rate, s.rate_sigma * s.rate_sigma, predict_rate(x, s));
     const std::size_t at = place_of(raw, s);
-    if (at < raw.anchored && goes_on(raw.phases.at(at), s)) {
+    const bool has_phase = at < raw.anchored && goes_on(raw.phases.at(at), s);
+    const double rate_sigma = (has_phase ? kBesidePhase : 1) * s.rate_sigma;
+    if (s.rate) add(RawKind::rate, *s.rate, rate_sigma * rate_sigma, predict_rate(x, s));
+    if (has_phase) {
       const AnchoredPhase& anchor = raw.phases.at(at);
       add(RawKind::phase, *s.phase - anchor.phase,
           s.phase_sigma * s.phase_sigma + anchor.sigma * anchor.sigma, predict_phase_change(x, s, anchor))
@@ -221,7 +226,8 @@ void Filter::set_anchor(const RawEpoch& epoch) {
   raw.anchored = 0;
   for (const RawSatellite& s : satellites_of(epoch)) {
     if (!s.phase) continue;
-    raw.phases.at(raw.anchored++) = {s.satellite, s.code, s.position, *s.phase, s.phase_sigma, s.half_cycle, true};
+    raw.phases.at(raw.anchored++) = {s.satellite,   s.code,       s.position, *s.phase,
+                                     s.phase_sigma, s.half_cycle, true};
   }
   raw.receiver.anchor_position = x.sampled_at();
   raw.receiver.anchor_clock = x.receiver.clock;

@@ -1,10 +1,10 @@
 // The simulated receiver against the least squares of navigation/gnss, which know nothing of it.
+#include "pade/simulation/flight/sensors/raw_gnss.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
-
-#include "pade/simulation/flight/sensors/raw_gnss.hpp"
 
 #include "navigation/gnss/constellation.hpp"
 

@@ -55,7 +55,8 @@ void RawGnss::step_clock(double dt) {
   clock_ += dt * clock_rate_ + model_.clock_noise * root * random_.normal();
   clock_rate_ += model_.clock_walk * root * random_.normal();
   const double millisecond = 1e-3 * kSpeedOfLight;
-  const double jump = std::abs(clock_) > model_.clock_limit * kSpeedOfLight ? std::copysign(millisecond, clock_) : 0;
+  const double jump =
+      std::abs(clock_) > model_.clock_limit * kSpeedOfLight ? std::copysign(millisecond, clock_) : 0;
   clock_ -= jump;
 }
 
@@ -118,7 +119,8 @@ gnss::Signal RawGnss::measure(const Visible& v, Time gps_time, bool has_phase) {
                  gnss::ionosphere_delay(*broadcast_->ionosphere, place_, v.direction, gps_time);
   }
   const double delay = v.ephemeris.kepler != nullptr ? kSpeedOfLight * v.ephemeris.kepler->group_delay : 0;
-  const double seen = v.range + clock_ + model_.system_bias.at(system) - kSpeedOfLight * v.sent.clock + troposphere;
+  const double seen =
+      v.range + clock_ + model_.system_bias.at(system) - kSpeedOfLight * v.sent.clock + troposphere;
   const double height = std::sin(v.direction.elevation);
   const double lowest = std::sin(model_.lowest_elevation);
   const double share = std::clamp((1 / height - 1) / (1 / lowest - 1), 0.0, 1.0);
@@ -141,7 +143,8 @@ gnss::Signal RawGnss::measure(const Visible& v, Time gps_time, bool has_phase) {
   const double range_sigma = model_.range_zenith + share * (model_.range_horizon - model_.range_zenith);
   signal.pseudorange = seen + ionosphere + delay + range_sigma * range_noise + (reflected ? longer : 0);
   signal.doppler =
-      -(v.rate + clock_rate_ - kSpeedOfLight * v.sent.clock_rate + model_.rate_white * rate_noise) / wavelength;
+      -(v.rate + clock_rate_ - kSpeedOfLight * v.sent.clock_rate + model_.rate_white * rate_noise) /
+      wavelength;
   signal.cn0 = 47 - 7 * share + 0.5 * strength_noise;
   Tracked& tracked = tracked_[v.satellite];
   if (has_phase) {

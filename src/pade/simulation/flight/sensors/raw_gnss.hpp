@@ -1,5 +1,5 @@
-// A GNSS receiver that gives what it measures of each satellite: pseudorange, Doppler, phase, strength; with a clock
-// that drifts and jumps, reflections, slips, and a sky that is masked or behind leaves at times.
+// A GNSS receiver that gives what it measures of each satellite: pseudorange, Doppler, phase, strength; with
+// a clock that drifts and jumps, reflections, slips, and a sky that is masked or behind leaves at times.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 namespace pade::simulation {
 
-/// Something that lasts `duration` seconds and begins every `period` seconds, first `period - duration` seconds after
-/// the first epoch; a period of 0 is never.
+/// Something that lasts `duration` seconds and begins every `period` seconds, first `period - duration`
+/// seconds after the first epoch; a period of 0 is never.
 struct Spells {
   double period = 0;
   double duration = 0;
@@ -42,10 +42,10 @@ struct RawGnssModel {
   double clock_walk = 0.2;           ///< walk of its rate, m/s/sqrt(s)
   double clock_limit = 5e-4;         ///< beyond it the clock is set by a millisecond, s
   std::array<double, gnss::kSystems> system_bias{0, 8, 3, -5};  ///< of the signals of each system, m
-  std::size_t satellites_left = 3;   ///< the highest, while the sky is masked
-  Spells masked;                     ///< all others are gone
-  Spells canopy;                     ///< no phases
-  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  ///< antenna in the body frame, m
+  std::size_t satellites_left = 3;                              ///< the highest, while the sky is masked
+  Spells masked;                                                ///< all others are gone
+  Spells canopy;                                                ///< no phases
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();          ///< antenna in the body frame, m
 };
 
 class RawGnss {
