@@ -11,7 +11,8 @@
 
 namespace pade::navigation {
 
-struct RawEpoch;  // tight/raw_epoch.hpp
+/// An epoch of raw GNSS, prepared for the filter: tight/raw_epoch.hpp, which is not installed yet.
+struct RawEpoch;
 
 /// How many measurements of single satellites were used and refused.
 struct RawCounts {
