@@ -62,6 +62,9 @@ install(FILES ${PROJECT_BINARY_DIR}/padeConfig.cmake ${PROJECT_BINARY_DIR}/padeC
         DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
 
 install(TARGETS pade_cli RUNTIME COMPONENT pade)
+# Where systemd looks beside the packages' own.
+configure_file(${PROJECT_SOURCE_DIR}/config/systemd/pade-live@.service.in ${PROJECT_BINARY_DIR}/pade-live@.service @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/pade-live@.service DESTINATION lib/systemd/system COMPONENT pade)
 foreach(component pade libpade-dev)
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${component} RENAME copyright
           COMPONENT ${component})

@@ -158,5 +158,6 @@ run_tests() {
   local preset=$1 folder=$2
   shift 2
   say "Testing $folder/ ..."
-  (cd "$root" && ctest --preset "$preset" -j "$(job_count)" --no-tests=error "$@")
+  # One more than processors: the tests of live sessions mostly wait.
+  (cd "$root" && ctest --preset "$preset" -j "$(($(job_count) + 1))" --no-tests=error "$@")
 }

@@ -1,12 +1,14 @@
 // A session in real time, with a camera and poses that are made here.
 #include "pade/live/session.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <memory>
 #include <numbers>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,15 +23,21 @@ class EastwardPoses : public NavigationSource {
  public:
   explicit EastwardPoses(Time zero) : zero_(zero) {}
   [[nodiscard]] PoseAnswer pose_at(Time time) const override {
-    if (!come) return {};
-    PoseAnswer answer{PoseAnswer::Kind::valid, {}, {}};
+    const double age = seconds_between(time, now_of_ours());
+    // Messages come at their rate: the one after a time is there when the next is due, and then as late as
+    // the link makes it.
+    const double phase = seconds_between(zero_, time);
+    const double until_next = burst > 0 ? burst * (std::floor(phase / burst) + 1) - phase : 0;
+    if (!come || age < late + until_next) return {};
+    PoseAnswer answer{PoseAnswer::Kind::valid, {}, {}, jumped};
     answer.T_world_body.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
     answer.T_world_body.translation.x() = kSpeed * seconds_between(zero_, time);
     return answer;
   }
-  [[nodiscard]] std::size_t jumps() const override { return jumped; }
 
   std::atomic<bool> come{true};
+  std::atomic<double> late{0};   // s
+  std::atomic<double> burst{0};  // s from message to message
   std::atomic<std::size_t> jumped{0};
 
  private:
@@ -43,6 +51,8 @@ class Gatherer : public Sink {
     ages.push_back(seconds_between(update.time, now_of_ours()));
     last = update;
   }
+  void begin_anew() override { ++begun_anew; }
+  int begun_anew = 0;
   std::vector<double> ages;
   LiveUpdate last;
   std::atomic<int> pause{0};  // ms
@@ -116,6 +126,45 @@ TEST(Session, FramesWaitForLatePoses) {
   EXPECT_GT(counts.mapped * 10, counts.frames * 7);
 }
 
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+/// Four frames of a fast camera are fewer than its poses are late: they must not push each other out for
+/// ever.
+TEST(Session, AFastCameraIsMappedWithPosesThatAreLate) {
+  for (const double late : {0.0, 0.05, 0.1, 0.15}) {
+    Bed bed(60);
+    bed.poses.late = late;
+    bed.poses.burst = 1.0 / 30;
+    const auto& counts = bed.run(2, [](double) {});
+    expect_all_counted(counts, bed.camera.delivered);
+    EXPECT_GT(counts.mapped, 16U) << late;  // 8 Hz
+    if (late <= 0.1) {
+      const auto found = counts.reasons.find("the session ended");
+      const std::size_t at_the_end = found == counts.reasons.end() ? 0 : found->second;
+      EXPECT_LE((counts.skipped - at_the_end) * 100, counts.frames + 100) << late;
+    }
+    ASSERT_FALSE(bed.gatherer.ages.empty());
+    EXPECT_LT(median(bed.gatherer.ages), 0.3) << late;
+  }
+}
+
+/// Sectors older than 0.3 s are not sent: a mapper that falls behind passes over frames rather than all being
+/// late.
+TEST(Session, AMapperThatFallsBehindMapsTheNewestThatHasAPose) {
+  Bed bed(30);
+  bed.poses.late = 0.1;
+  bed.poses.burst = 1.0 / 30;
+  bed.gatherer.pause = 80;
+  const auto& counts = bed.run(2.5, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  const auto in_time =
+      std::count_if(bed.gatherer.ages.begin(), bed.gatherer.ages.end(), [](double age) { return age < 0.3; });
+  EXPECT_GT(in_time * 10, static_cast<std::ptrdiff_t>(bed.gatherer.ages.size()) * 8);
+}
+
 TEST(Session, ASlowMapperDropsOldFramesAndKeepsTheNewest) {
   Bed bed(40);
   bed.gatherer.pause = 150;
@@ -130,6 +179,20 @@ TEST(Session, AJumpOfThePosesBeginsTheMapAnew) {
   const auto& counts = bed.run(1.6, [&](double elapsed) { bed.poses.jumped = elapsed > 0.8 ? 1 : 0; });
   expect_all_counted(counts, bed.camera.delivered);
   EXPECT_EQ(counts.restarts, 1U);
+  EXPECT_EQ(bed.gatherer.begun_anew, 1);
+  EXPECT_LT(counts.mapped_anew, counts.mapped);
+  EXPECT_GT(counts.mapped_anew, 0U);
+}
+
+/// An autopilot that starts anew on the ground and then has no pose leaves the flight's map as it is.
+TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
+  Bed bed(10);
+  const auto& counts = bed.run(1.6, [&](double elapsed) {
+    bed.poses.jumped = elapsed > 0.8 ? 1 : 0;
+    bed.poses.come = elapsed <= 0.8;
+  });
+  EXPECT_EQ(counts.restarts, 0U);
+  EXPECT_FALSE(bed.session->map().bounds().isEmpty());
 }
 
 }  // namespace

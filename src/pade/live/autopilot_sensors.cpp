@@ -159,7 +159,8 @@ void SensorGatherer::add_fix(const Frame& frame) {
     ++without_fix_;
     return;
   }
-  const bool on_earth = std::abs(m->lat) <= 900'000'000 && std::abs(static_cast<double>(m->lon)) <= 1.8e9;
+  const bool on_earth =
+      std::abs(static_cast<double>(m->lat)) <= 9e8 && std::abs(static_cast<double>(m->lon)) <= 1.8e9;
   if (!time || !on_earth || repeats(fixes_, *time)) return;
   GeodeticFix fix{
       *time, 1e-7 * m->lat,       1e-7 * m->lon, kMilli * m->alt, kMilli * m->h_acc, kMilli * m->v_acc,
