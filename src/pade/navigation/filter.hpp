@@ -23,7 +23,9 @@ namespace pade::navigation {
 
 inline constexpr int kMaxClones = 10;
 inline constexpr int kMostCommon = kBase + kRawStates;  ///< errors without those of the clones
-inline constexpr int kMaxState = kMostCommon + 6 * kMaxClones;
+/// Even, one more than there are: what Eigen may align it sums in pairs, and without raw GNSS the sums must
+/// be those of a filter that knows nothing of it, to the last bit.
+inline constexpr int kMaxState = kMostCommon + 1 + 6 * kMaxClones;
 
 /// Split of a reported GNSS position error into white noise and Gauss-Markov bias.
 struct GnssErrorClass {
