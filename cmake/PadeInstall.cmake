@@ -62,6 +62,9 @@ install(FILES ${PROJECT_BINARY_DIR}/padeConfig.cmake ${PROJECT_BINARY_DIR}/padeC
         DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
 
 install(TARGETS pade_cli RUNTIME COMPONENT pade)
+# Where systemd looks beside the packages' own.
+configure_file(${PROJECT_SOURCE_DIR}/config/systemd/pade-live@.service.in ${PROJECT_BINARY_DIR}/pade-live@.service @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/pade-live@.service DESTINATION lib/systemd/system COMPONENT pade)
 foreach(component pade libpade-dev)
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${component} RENAME copyright
           COMPONENT ${component})
@@ -89,6 +92,14 @@ set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_DEPENDS
     "libeigen3-dev (>= 3.4), libopencv-core-dev (>= 4.6), libopencv-imgproc-dev, libopencv-imgcodecs-dev, \
 libopencv-video-dev, liboctomap-dev (>= 1.9), libgeographiclib-dev (>= 2.1), libyaml-cpp-dev (>= 0.7), \
 nlohmann-json3-dev (>= 3.11), libfmt-dev (>= 9)")
+foreach(pair IN ITEMS bzip2/libbz2-dev lz4/liblz4-dev sqlite/libsqlite3-dev zstd/libzstd-dev)
+  string(REPLACE "/" ";" pair ${pair})
+  list(GET pair 0 part)
+  list(GET pair 1 package)
+  if(TARGET pade::${part})
+    string(APPEND CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_DEPENDS ", ${package}")
+  endif()
+endforeach()
 set(CPACK_COMPONENT_PADE_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: the program.")
 set(CPACK_COMPONENT_LIBPADE-DEV_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: library, headers and CMake files.")
 include(CPack)

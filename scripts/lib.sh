@@ -12,6 +12,7 @@ packages_build=(
   liboctomap-dev libgeographiclib-dev
   libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev
   libsdformat-dev libembree-dev libassimp-dev  # the simulator, 15 MB of 58; the build does without where they are missing
+  libbz2-dev liblz4-dev libzstd-dev libsqlite3-dev  # recordings of ROS; the build does without where they are missing
   libompl-dev  # `pade plan`; the build does without where it is missing
 )
 packages_test=(libgtest-dev libgmock-dev)
@@ -158,5 +159,6 @@ run_tests() {
   local preset=$1 folder=$2
   shift 2
   say "Testing $folder/ ..."
-  (cd "$root" && ctest --preset "$preset" -j "$(job_count)" --no-tests=error "$@")
+  # One more than processors: the tests of live sessions mostly wait.
+  (cd "$root" && ctest --preset "$preset" -j "$(($(job_count) + 1))" --no-tests=error "$@")
 }

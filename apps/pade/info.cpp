@@ -18,6 +18,7 @@
 #include "pade/checks/sequence_check.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/formats/map_files.hpp"
+#include "pade/io/recording/recording.hpp"
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/live/recordings/tlog.hpp"
@@ -49,6 +50,7 @@ struct InfoArguments {
   std::string poses = "groundtruth";
   std::string world_up;
   std::string calibration;
+  std::string topics;
   std::vector<double> at;
   int camera = 0;
   int step = 1;
@@ -262,8 +264,10 @@ Status inform_of_sequence(const InfoArguments& arguments) {
   options.world_up = arguments.world_up;
   options.calibration = arguments.calibration;
   options.camera = arguments.camera;
+  options.topics = arguments.topics;
   const Result<io::Sequence> sequence = io::Sequence::open(arguments.path, options);
   if (!sequence) {
+    if (io::is_recording(arguments.path)) return sequence.error();
     const std::vector<io::Sequence> below = sequences_in(arguments.path, options);
     return below.empty() ? Status(sequence.error()) : inform_of_set(arguments, below);
   }
@@ -388,8 +392,13 @@ Status inform(const InfoArguments& arguments) {
   if (!fs::exists(path, code)) {
     return Error{
         fmt::format("{}: found nothing there, expected a sequence, a map (.bt, .ot), a calibration, a "
-                    "recording (.tlog, .ulg) or a run",
+                    "recording (.bag, .mcap, .db3, .tlog, .ulg) or a run",
                     arguments.path)};
+  }
+  if (io::is_recording(path)) {
+    const auto images = inform_of_ros_recording(path, arguments.topics, arguments.json);
+    if (!images) return images.error();
+    return *images ? inform_of_sequence(arguments) : Status();
   }
   if (!fs::is_directory(path, code)) {
     if (live::is_tlog(path)) return inform_of_tlog(path, arguments.json);
@@ -416,11 +425,13 @@ void add_info(CLI::App& app, Context& context) {
       "  pade info out/flight       how a run went\n"
       "  pade info out/flight/map.bt\n"
       "  pade info camchain.yaml --camera 1     what is understood of a calibration\n"
-      "  pade info flight.tlog      messages, and whether the sensors in them will do\n");
+      "  pade info flight.tlog      messages, and whether the sensors in them will do\n"
+      "  pade info flight.bag       topics, and whether they make a flight\n");
   command
-      ->add_option("PATH", arguments->path,
-                   "Sequence, folder of sequences, map (.bt, .ot), calibration, recording of an "
-                   "autopilot (.tlog, .ulg) or run")
+      ->add_option(
+          "PATH", arguments->path,
+          "Sequence, folder of sequences, recording (.bag, .mcap, .db3, .tlog, .ulg), map (.bt, .ot), "
+          "calibration or run")
       ->required();
   command->add_option("--poses", arguments->poses, "groundtruth, original or a pose file")
       ->capture_default_str();
@@ -432,6 +443,8 @@ void add_info(CLI::App& app, Context& context) {
       ->add_option("--camera", arguments->camera,
                    "Which camera of a calibration file that holds several, from 0")
       ->check(CLI::Range(0, 99));
+  command->add_option("--topics", arguments->topics,
+                      "Topics of a recording that are meant where several fit, separated by blanks");
   command->add_option("--step", arguments->step, "Look at each frame and the k-th before it")
       ->capture_default_str();
   command->add_option("--at", arguments->at, "x y z: what a map says of a place, m")->expected(3);

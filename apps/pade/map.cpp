@@ -41,7 +41,7 @@ struct MapArguments {
   bool no_report = false;
   int threads = 1;
 
-  std::optional<std::string> flow, poses, calibration, world_up, origin, refine_motion;
+  std::optional<std::string> flow, poses, calibration, world_up, origin, topics, refine_motion;
   std::optional<DepthFrom> depth;
   std::optional<depth::Model> model;
   std::optional<depth::Reading> reading;
@@ -87,6 +87,7 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.world_up, arguments.world_up);
   set(options.sequence.origin, arguments.origin);
   set(options.sequence.camera, arguments.camera);
+  set(options.sequence.topics, arguments.topics);
   if (arguments.imu) set_imu(options, *arguments.imu);
   options.sequence.strict = options.sequence.strict || arguments.strict;
   options.world_coordinates = options.world_coordinates || arguments.world_coordinates;
@@ -224,7 +225,8 @@ void add_map(CLI::App& app, Context& context) {
   CLI::App* map = app.add_subcommand("map", "Map a recorded flight: depth images and an obstacle map.");
   map->footer(
       "SEQUENCE is a folder in the TUM RGB-D, EuRoC, KITTI odometry, TartanAir or ICL-NUIM layout\n"
-      "(docs/sequences.md).\n"
+      "(docs/sequences.md), or a recording of ROS: rosbag 2.0 (.bag), MCAP or rosbag2's .db3 "
+      "(docs/formats.md).\n"
       "The run folder holds map.bt and map.ot (octovis), map.json, cloud.ply, trajectory.txt, run.json, "
       "timing.json,\n"
       "report.html and, if the flight has true depth, evaluation.json and .csv.\n"
@@ -232,7 +234,7 @@ void add_map(CLI::App& app, Context& context) {
       "  pade map flight --out run\n"
       "  pade map flight --out run --flow dis-fast --range 40 --save depth,sigma,state,bound\n"
       "  pade map flight --out literal --paper");
-  map->add_option("sequence", a->sequence, "folder of the recorded flight")->required();
+  map->add_option("sequence", a->sequence, "folder or recording of the flight")->required();
   map->add_option("-o,--out", a->out, "folder of the run, made by this command")->required();
   add_pipeline_options(*map, *a);
   map->add_option(
@@ -241,6 +243,8 @@ void add_map(CLI::App& app, Context& context) {
       "filter), or a pose file (TUM)");
   add_enum(*map, "--imu", a->imu, "class of the IMU, for --poses from-imu-gnss (default industrial)");
   map->add_option("--calibration", a->calibration, "calibration file instead of the sequence's own");
+  map->add_option("--topics", a->topics,
+                  "topics of a recording that are meant where several fit, separated by blanks");
   map->add_option("--world-up", a->world_up, "axis of the pose world that points up: +x -x +y -y +z -z");
   map->add_option("--camera", a->camera, "which camera of a calibration file that holds several, from 0")
       ->check(CLI::Range(0, 99));

@@ -59,6 +59,16 @@ void collect(const std::string& path,
   for (const auto& name : subcommands(help)) collect(path.empty() ? name : path + " " + name, commands);
 }
 
+/// Asked once: each command's help is a process of its own.
+const std::vector<std::pair<std::string, std::vector<std::string>>>& all_commands() {
+  static const auto commands = [] {
+    std::vector<std::pair<std::string, std::vector<std::string>>> found;
+    collect("", found);
+    return found;
+  }();
+  return commands;
+}
+
 /// What bash offers after typing `line` (its last word may be empty).
 std::set<std::string> bash_offers(std::vector<std::string> line) {
   std::string words;
@@ -76,8 +86,7 @@ class Completion : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(Completion, NamesEverySubcommandAndLongOptionOfTheHelp) {
   const std::string script = output_of(kPade + " completion " + GetParam());
-  std::vector<std::pair<std::string, std::vector<std::string>>> commands;
-  collect("", commands);
+  const auto& commands = all_commands();
   ASSERT_GE(commands.size(), 3U);
   for (const auto& [path, options] : commands) {
     EXPECT_THAT(options, Contains("--help")) << path;

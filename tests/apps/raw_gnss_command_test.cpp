@@ -72,5 +72,57 @@ TEST(RawGnssCommand, RefusesAFolderWithoutRawGnssAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
+TEST(RawGnssCommand, SaysOfAnEmptyFileWhatWasExpected) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder / "rover.obs") << "";
+  const auto run = test::shell(test::kPade + " navigate " + (folder / "rover.obs").string() + " --out " +
+                               (folder / "out").string());
+  EXPECT_EQ(run.code, 1);
+  EXPECT_THAT(run.text, HasSubstr("expected RINEX 3 observations, UBX"));
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+TEST(RawGnssCommand, RefusesAMaskThatIsNoAngle) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder / "street.txt") << ranges_over(gnss::ecef_of({0.85, 0.16, 300}));
+  for (const char* mask : {"nan", "inf", "-1", "61", "ten", ""}) {
+    const auto run = test::shell(test::kPade + " navigate " + (folder / "street.txt").string() + " --out " +
+                                 (folder / "out").string() + " --elevation-mask='" + mask + "'");
+    EXPECT_NE(run.code, 0) << mask;
+    EXPECT_FALSE(fs::exists(folder / "out")) << mask;
+  }
+}
+
+TEST(RawGnssCommand, PutsRawGnssIntoTheFilter) {
+  const fs::path data = fs::path(PADE_SOURCE_DIR) / "../shared/data/navigation/static_vn310_raw";
+  if (!fs::exists(data)) GTEST_SKIP() << data << " is not here";
+  const test::TemporaryFolder folder;
+  for (const std::string coupling : {"tight", "loose"}) {
+    const auto out = folder / coupling;
+    const auto run = test::shell(test::kPade + " navigate " + data.string() + " --heading 0 --raw-coupling " +
+                                 coupling + " --out " + out.string());
+    ASSERT_EQ(run.code, 0) << run.text;
+    const auto json = nlohmann::json::parse(*io::read_file(out / "navigation.json"));
+    const bool tight = coupling == "tight";
+    EXPECT_EQ(json["raw_gnss"]["phases"]["used"].get<int>() > 5000, tight);
+    EXPECT_EQ(run.text.find("satellite by satellite") != std::string::npos, tight);
+    for (const char* file : {"trajectory.txt", "residuals.csv", "raw_report.html", "report.html"}) {
+      EXPECT_TRUE(fs::exists(out / file)) << file;
+    }
+  }
+}
+
+TEST(RawGnssCommand, RefusesRawGnssOfAnotherTime) {
+  const fs::path data = fs::path(PADE_SOURCE_DIR) / "../shared/data/navigation";
+  if (!fs::exists(data)) GTEST_SKIP() << data << " is not here";
+  const test::TemporaryFolder folder;
+  const auto run = test::shell(test::kPade + " navigate " + (data / "mav_mh01").string() +
+                               " --gnss gnss_spp_5hz.csv --raw-coupling tight --raw-gnss " +
+                               (data / "static_vn310_raw").string() + " --out " + (folder / "out").string());
+  EXPECT_EQ(run.code, 1);
+  EXPECT_THAT(run.text, HasSubstr("expected that they overlap in GPS time"));
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
 }  // namespace
 }  // namespace pade

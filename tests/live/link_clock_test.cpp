@@ -63,7 +63,7 @@ TEST(LinkClock, ErrsLessThanHalfAMillisecondUnderDriftAndJitter) {
     double since = -1;
     for (double now = 0; now < 60e9; now += kStep) {
       link.ask(sync, now);
-      if (!sync.synchronised()) continue;
+      if (!sync.synchronised(Link::at(now))) continue;
       if (since < 0) since = now;
       errors.push_back(error_ms(sync, link, now + kStep));
     }
@@ -90,7 +90,7 @@ TEST(LinkClock, SeesARestartWithinASecondAndSynchronisesAnew) {
     for (; now < restart + 20e9; now += kStep) {
       link.ask(sync, now);
       if (seen < 0 && sync.restarts() == 1) seen = now;
-      if (seen >= 0 && ready < 0 && sync.synchronised()) ready = now;
+      if (seen >= 0 && ready < 0 && sync.synchronised(Link::at(now))) ready = now;
       if (ready >= 0) errors.push_back(error_ms(sync, link, now + kStep));
     }
     ASSERT_EQ(sync.restarts(), 1U);
@@ -118,9 +118,24 @@ TEST(LinkClock, OneOddAnswerChangesNothing) {
   EXPECT_EQ(sync.restarts(), 0U);
 }
 
+/// Our line to the autopilot is cut, its poses go on: by and by nothing is known of its clock any more.
+TEST(LinkClock, ExpiresWhereAnswersStop) {
+  Link link(5, 20e-6);
+  LinkClock sync;
+  double now = 0;
+  for (; now < 5e9; now += kStep) link.ask(sync, now);
+  EXPECT_TRUE(sync.synchronised(Link::at(now + 8e9)));
+  EXPECT_TRUE(sync.to_autopilot(Link::at(now + 8e9)));
+  EXPECT_FALSE(sync.synchronised(Link::at(now + 11e9)));
+  EXPECT_FALSE(sync.to_autopilot(Link::at(now + 11e9)));
+  EXPECT_FALSE(sync.to_ours(Link::at(link.clock(now + 11e9))));
+  for (now += 20e9; now < 26e9; now += kStep) link.ask(sync, now);
+  EXPECT_TRUE(sync.synchronised(Link::at(now)));
+}
+
 TEST(LinkClock, SaysNothingBeforeItKnows) {
   LinkClock sync;
-  EXPECT_FALSE(sync.synchronised());
+  EXPECT_FALSE(sync.synchronised({5}));
   EXPECT_FALSE(sync.to_ours({5}));
   sync.add({0}, {100}, {10});
   EXPECT_FALSE(sync.to_autopilot({5}));

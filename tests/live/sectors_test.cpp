@@ -338,7 +338,75 @@ TEST(Sectors, BearingsCountClockwiseFromAheadAndTheSlabIsLevel) {
   for (const std::uint16_t d : m.distances) EXPECT_EQ(d, 30);  // all around, as the least distance
 }
 
+/// What the map remembers of places that the camera does not see is old: somebody may have stepped there.
+TEST(Sectors, OutsideTheViewOfTheCameraNothingIsSaid) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> place(-7, 7);
+  std::vector<Vector3d> obstacles;
+  for (int i = 0; i < 60; ++i) obstacles.push_back(centre_of_voxel(place(random), place(random), 0.1));
+  const auto view = MapView::of(with_voxels(free_map(9), obstacles));
+  auto options = options_of_sectors();
+  options.max_distance = 6;
+  int inside = 0, outside = 0, at_the_edge = 0, free_bins = 0;
+  for (int round = 0; round < 60; ++round) {
+    const Pose body = body_at(random, 2);
+    const SectorView sight{round % 2 == 0 ? 0.0 : -70.0, 20.0 + round};
+    const auto all = obstacle_distances(*view, body, options);
+    const auto seen = obstacle_distances(*view, body, options, sight);
+    for (std::size_t k = 0; k < kBins; ++k) {
+      const double low = 5.0 * static_cast<double>(k) - 5;
+      int parts = 0;
+      for (int i = 0; i <= 30; ++i) parts += apart(low + 0.5 * i, sight.middle) <= sight.half ? 1 : 0;
+      if (parts == 31) {
+        EXPECT_EQ(seen[k], all[k]);
+        free_bins += all[k] == 601 ? 1 : 0;
+        ++inside;
+      } else if (parts == 0 && apart(low + 7.5, sight.middle) > sight.half + 20) {
+        // But for a voxel so near that it reaches into the view.
+        EXPECT_TRUE(seen[k] == kUnknownDistance || seen[k] < 150) << seen[k];
+        ++outside;
+      } else {
+        EXPECT_NE(seen[k], 601) << "free, and only part of it is seen";
+        EXPECT_TRUE(seen[k] == kUnknownDistance || seen[k] >= all[k]);
+        ++at_the_edge;
+      }
+    }
+  }
+  EXPECT_GT(inside, 500);
+  EXPECT_GT(outside, 500);
+  EXPECT_GT(at_the_edge, 200);
+  EXPECT_GT(free_bins, 20);
+}
+
+TEST(Sectors, TheViewIsThatOfTheCameraAsItIsMounted) {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 320 / std::tan(30 * kRadian);
+  camera.cx = 319.5;
+  camera.cy = 239.5;
+  const auto turned = [](double yaw, double pitch) {
+    Pose T_body_camera;
+    T_body_camera.rotation = Eigen::AngleAxisd(yaw * kRadian, Vector3d::UnitZ()) *
+                             Eigen::AngleAxisd(pitch * kRadian, Vector3d::UnitY()) *
+                             Eigen::Quaterniond(forward_camera_rotation());
+    return T_body_camera;
+  };
+  const SectorView ahead = SectorView::of(camera, turned(0, 0));
+  EXPECT_NEAR(ahead.middle, 0, 1e-9);
+  EXPECT_NEAR(ahead.half, 30, 1e-9);
+  const SectorView left = SectorView::of(camera, turned(40, 20));
+  EXPECT_NEAR(left.middle, -40, 1e-9);
+  EXPECT_NEAR(left.half, std::atan(std::tan(30 * kRadian) / std::cos(20 * kRadian)) / kRadian, 1e-6);
+  EXPECT_EQ(SectorView::of(camera, turned(0, 90)).half, 0) << "a camera that looks down sees nothing around";
+}
+
 TEST(Sectors, OptionsThatMakeNoSenseAreRefused) {
+  SectorOptions own;
+  own.max_distance = 5;
+  own.own_radius = 4;  // what nobody has seen would be most of what is called free
+  EXPECT_FALSE(check(own));
+
   SectorOptions options;
   EXPECT_TRUE(check(options));
   options.max_distance = 700;  // more than 16 bits hold

@@ -1,17 +1,24 @@
 // A session in real time, with a camera and poses that are made here.
 #include "pade/live/session.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <memory>
 #include <numbers>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pade/io/formats/map_files.hpp"
+#include "pade/io/sequence/sequence.hpp"
+#include "pade/live/recordings/session_recorder.hpp"
+
 #include "live/wall_camera.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace pade::live {
 namespace {
@@ -21,15 +28,21 @@ class EastwardPoses : public NavigationSource {
  public:
   explicit EastwardPoses(Time zero) : zero_(zero) {}
   [[nodiscard]] PoseAnswer pose_at(Time time) const override {
-    if (!come) return {};
-    PoseAnswer answer{PoseAnswer::Kind::valid, {}, {}};
+    const double age = seconds_between(time, now_of_ours());
+    // Messages come at their rate: the one after a time is there when the next is due, and then as late as
+    // the link makes it.
+    const double phase = seconds_between(zero_, time);
+    const double until_next = burst > 0 ? burst * (std::floor(phase / burst) + 1) - phase : 0;
+    if (!come || age < late + until_next) return {};
+    PoseAnswer answer{PoseAnswer::Kind::valid, {}, {}, jumped};
     answer.T_world_body.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
     answer.T_world_body.translation.x() = kSpeed * seconds_between(zero_, time);
     return answer;
   }
-  [[nodiscard]] std::size_t jumps() const override { return jumped; }
 
   std::atomic<bool> come{true};
+  std::atomic<double> late{0};   // s
+  std::atomic<double> burst{0};  // s from message to message
   std::atomic<std::size_t> jumped{0};
 
  private:
@@ -43,6 +56,8 @@ class Gatherer : public Sink {
     ages.push_back(seconds_between(update.time, now_of_ours()));
     last = update;
   }
+  void begin_anew() override { ++begun_anew; }
+  int begun_anew = 0;
   std::vector<double> ages;
   LiveUpdate last;
   std::atomic<int> pause{0};  // ms
@@ -50,14 +65,13 @@ class Gatherer : public Sink {
 
 /// A session for some seconds.
 struct Bed {
-  explicit Bed(double rate) : camera(rate), poses(camera.zero) {
+  explicit Bed(double rate, InputSink* recorder = nullptr) : camera(rate), poses(camera.zero) {
     Pose mounting;
     mounting.rotation = Eigen::Quaterniond(forward_camera_rotation());
-    ObstacleMapperOptions mapper;
     mapper.map.voxel = 0.25;  // a pixel sees 5 cm of the wall
     SessionOptions options;
     options.velocity_sigma = 0.02;
-    auto made = Session::create({camera, poses, {&gatherer}, progress, mounting}, options, mapper);
+    auto made = Session::create({camera, poses, {&gatherer}, progress, mounting, recorder}, options, mapper);
     EXPECT_TRUE(made) << made.error().message;
     session = std::make_unique<Session>(std::move(*made));
   }
@@ -71,6 +85,7 @@ struct Bed {
     });
     return session->counts();
   }
+  ObstacleMapperOptions mapper;
   WallCamera camera;
   EastwardPoses poses;
   Gatherer gatherer;
@@ -116,6 +131,45 @@ TEST(Session, FramesWaitForLatePoses) {
   EXPECT_GT(counts.mapped * 10, counts.frames * 7);
 }
 
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+/// Four frames of a fast camera are fewer than its poses are late: they must not push each other out for
+/// ever.
+TEST(Session, AFastCameraIsMappedWithPosesThatAreLate) {
+  for (const double late : {0.0, 0.05, 0.1, 0.15}) {
+    Bed bed(60);
+    bed.poses.late = late;
+    bed.poses.burst = 1.0 / 30;
+    const auto& counts = bed.run(2, [](double) {});
+    expect_all_counted(counts, bed.camera.delivered);
+    EXPECT_GT(counts.mapped, 16U) << late;  // 8 Hz
+    if (late <= 0.1) {
+      const auto found = counts.reasons.find("the session ended");
+      const std::size_t at_the_end = found == counts.reasons.end() ? 0 : found->second;
+      EXPECT_LE((counts.skipped - at_the_end) * 100, counts.frames + 100) << late;
+    }
+    ASSERT_FALSE(bed.gatherer.ages.empty());
+    EXPECT_LT(median(bed.gatherer.ages), 0.3) << late;
+  }
+}
+
+/// Sectors older than 0.3 s are not sent: a mapper that falls behind passes over frames rather than all being
+/// late.
+TEST(Session, AMapperThatFallsBehindMapsTheNewestThatHasAPose) {
+  Bed bed(30);
+  bed.poses.late = 0.1;
+  bed.poses.burst = 1.0 / 30;
+  bed.gatherer.pause = 80;
+  const auto& counts = bed.run(2.5, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  const auto in_time =
+      std::count_if(bed.gatherer.ages.begin(), bed.gatherer.ages.end(), [](double age) { return age < 0.3; });
+  EXPECT_GT(in_time * 10, static_cast<std::ptrdiff_t>(bed.gatherer.ages.size()) * 8);
+}
+
 TEST(Session, ASlowMapperDropsOldFramesAndKeepsTheNewest) {
   Bed bed(40);
   bed.gatherer.pause = 150;
@@ -130,6 +184,88 @@ TEST(Session, AJumpOfThePosesBeginsTheMapAnew) {
   const auto& counts = bed.run(1.6, [&](double elapsed) { bed.poses.jumped = elapsed > 0.8 ? 1 : 0; });
   expect_all_counted(counts, bed.camera.delivered);
   EXPECT_EQ(counts.restarts, 1U);
+  EXPECT_EQ(bed.gatherer.begun_anew, 1);
+  EXPECT_LT(counts.mapped_anew, counts.mapped);
+  EXPECT_GT(counts.mapped_anew, 0U);
+}
+
+/// An autopilot that starts anew on the ground and then has no pose leaves the flight's map as it is.
+TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
+  Bed bed(10);
+  const auto& counts = bed.run(1.6, [&](double elapsed) {
+    bed.poses.jumped = elapsed > 0.8 ? 1 : 0;
+    bed.poses.come = elapsed <= 0.8;
+  });
+  EXPECT_EQ(counts.restarts, 0U);
+  EXPECT_FALSE(bed.session->map().bounds().isEmpty());
+}
+
+std::string bytes_of(const mapping::OccupancyMap& map) {
+  return io::bytes_of(io::encode_map(map, io::MapFormat::bt));
+}
+
+/// The map that a recording makes.
+std::string replayed(const std::filesystem::path& file, const ObstacleMapperOptions& options) {
+  const auto sequence = io::Sequence::open(file);
+  EXPECT_TRUE(sequence) << sequence.error().message;
+  if (!sequence) return {};
+  auto mapper = ObstacleMapper::create(sequence->camera(), options, sequence->mask());
+  EXPECT_TRUE(mapper);
+  for (std::size_t i = 0; i < sequence->size(); ++i) {
+    const auto frame = sequence->frame(i);
+    EXPECT_TRUE(frame) << frame.error().message;
+    if (frame) mapper->add(frame->image, frame->time, frame->T_world_camera, frame->motion_covariance);
+  }
+  return bytes_of(mapper->map());
+}
+
+TEST(SessionRecording, MakesTheSameMapAgain) {
+  const test::TemporaryFolder folder;
+  for (const char* const name : {"flight.mcap", "flight.bag"}) {
+    const WallCamera camera(10);  // as that of the bed
+    auto recorder = SessionRecorder::create(folder / name, camera.camera(), camera.mask());
+    ASSERT_TRUE(recorder) << recorder.error().message;
+    Bed bed(10, recorder->get());
+    const auto& counts = bed.run(2, [](double) {});
+    const Status finished = (*recorder)->finish();
+    ASSERT_TRUE(finished) << finished.error().message;
+    ASSERT_EQ((*recorder)->left_out(), 0U);
+    EXPECT_GT(counts.mapped, 8U);
+    EXPECT_EQ(replayed(folder / name, bed.mapper), bytes_of(bed.session->map())) << name;
+  }
+}
+
+TEST(SessionRecording, BeginsAnewWithTheMap) {
+  const test::TemporaryFolder folder;
+  const WallCamera camera(10);
+  auto recorder = SessionRecorder::create(folder / "flight.mcap", camera.camera(), camera.mask());
+  ASSERT_TRUE(recorder) << recorder.error().message;
+  Bed bed(10, recorder->get());
+  bed.run(2, [&](double elapsed) { bed.poses.jumped = elapsed > 1 ? 1 : 0; });
+  ASSERT_TRUE((*recorder)->finish());
+  EXPECT_EQ((*recorder)->file(), folder / "flight-2.mcap");
+  EXPECT_EQ(replayed(folder / "flight-2.mcap", bed.mapper), bytes_of(bed.session->map()));
+  EXPECT_TRUE(std::filesystem::exists(folder / "flight.mcap"));
+  EXPECT_EQ(folder.entries(), 2U);
+}
+
+TEST(SessionRecording, WithoutAFrameSaysSo) {
+  const test::TemporaryFolder folder;
+  auto recorder = SessionRecorder::create(folder / "flight.mcap", Camera{}, {});
+  ASSERT_TRUE(recorder);
+  const Status finished = (*recorder)->finish();
+  ASSERT_FALSE(finished);
+  EXPECT_THAT(finished.error().message, ::testing::HasSubstr("nothing was recorded"));
+  EXPECT_EQ(folder.entries(), 0U);
+}
+
+TEST(Session, SaysHowFarTheStampsAreOffOnceItIsCertain) {
+  EXPECT_EQ(stamp_text(std::nullopt), "");
+  EXPECT_EQ(stamp_text(StampOffset{-0.012, 0.004, 20}), "");  // three sigmas
+  EXPECT_EQ(stamp_text(StampOffset{0.003, 0.0001, 20}), "");  // too small to matter
+  EXPECT_EQ(stamp_text(StampOffset{-0.012, 0.0005, 20}),
+            "the images' stamps are 12.0 ms late (1 sigma 0.5 ms): add -0.0120 to session.time_offset");
+  EXPECT_THAT(stamp_text(StampOffset{0.02, 0.001, 20}), ::testing::HasSubstr("20.0 ms early"));
 }
 
 }  // namespace

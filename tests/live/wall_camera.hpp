@@ -25,16 +25,29 @@ inline Camera small_camera() {
   return camera;
 }
 
+inline cv::Mat textured_wall() {
+  cv::Mat noise(64, 2000, CV_8UC1);
+  cv::RNG random(4);
+  random.fill(noise, cv::RNG::UNIFORM, 0, 255);
+  cv::Mat wall;
+  cv::GaussianBlur(noise, wall, {0, 0}, 1.5);
+  cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+  return wall;
+}
+
+/// What small_camera() sees of it after so many seconds.
+inline cv::Mat image_of_wall(const cv::Mat& wall, double seconds) {
+  const double moved = 60 * kSpeed * seconds / 3;  // px
+  const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, moved, 0, 1, 0);
+  cv::Mat image;
+  cv::warpAffine(wall, image, shift, {96, 64}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
+  return image;
+}
+
 /// A textured wall 3 m ahead, past which the camera flies to the right.
 class WallCamera : public FrameSource {
  public:
-  explicit WallCamera(double rate) : rate_(rate) {
-    cv::Mat noise(64, 2000, CV_8UC1);
-    cv::RNG random(4);
-    random.fill(noise, cv::RNG::UNIFORM, 0, 255);
-    cv::GaussianBlur(noise, wall_, {0, 0}, 1.5);
-    cv::normalize(wall_, wall_, 0, 255, cv::NORM_MINMAX);
-  }
+  explicit WallCamera(double rate) : rate_(rate) {}
   Outcome next(LiveFrame& frame, int milliseconds) override {
     const auto due = start_ + std::chrono::duration<double>(count_ / rate_);
     const auto longest = std::chrono::steady_clock::now() + std::chrono::milliseconds(milliseconds);
@@ -43,9 +56,7 @@ class WallCamera : public FrameSource {
     if (std::chrono::steady_clock::now() < due || stalled) return Outcome::nothing;
     ++count_;
     frame.time = now_of_ours();
-    const double moved = 60 * kSpeed * seconds_between(zero, frame.time) / 3;  // px
-    const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, moved, 0, 1, 0);
-    cv::warpAffine(wall_, frame.image, shift, {96, 64}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
+    frame.image = image_of_wall(wall_, seconds_between(zero, frame.time));
     ++delivered;
     return Outcome::frame;
   }
@@ -61,7 +72,7 @@ class WallCamera : public FrameSource {
   double rate_;
   int count_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  cv::Mat wall_;
+  cv::Mat wall_ = textured_wall();
 };
 
 }  // namespace pade::live

@@ -1,11 +1,15 @@
 // `pade live`: camera and autopilot in, sectors and a map out.
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -13,6 +17,9 @@
 #include "pade/io/formats/map_files.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/config.hpp"
+#include "pade/live/map_saver.hpp"
+#include "pade/live/recordings/session_recorder.hpp"
+#include "pade/live/service.hpp"
 #include "pade/live/session.hpp"
 
 #include "commands.hpp"
@@ -34,7 +41,9 @@ class LinkThread {
           constexpr int kRound = 5;  // ms
           while (!over_) {
             link.wait(kRound);
-            link.step(live::now_of_ours(), progress);
+            const Time now = live::now_of_ours();
+            link.step(now, progress);
+            turned_ = now.nanoseconds;
           }
         }) {}
   LinkThread(const LinkThread&) = delete;
@@ -43,9 +52,12 @@ class LinkThread {
     over_ = true;
     thread_.join();
   }
+  /// When it last went round.
+  [[nodiscard]] Time turned() const { return Time{turned_}; }
 
  private:
   std::atomic<bool> over_{false};
+  std::atomic<std::int64_t> turned_{0};
   std::thread thread_;
 };
 
@@ -59,6 +71,7 @@ struct LiveParts {
 Result<LiveParts> open_parts(const LiveArguments& arguments) {
   auto options = live::read_live_options(arguments.config);
   if (!options) return options.error();
+  if (const Status place = live::check_place_of_map(options->map); !place) return place.error();
   auto camera = live::open_camera(options->camera);
   if (!camera) return camera.error();
   auto port = live::open_port(options->link.port, options->link.baud);
@@ -101,11 +114,13 @@ Status check_parts(LiveParts& parts) {
       constexpr int kRound = 50;  // ms
       image = parts.camera.source->next(frame, kRound) == live::FrameSource::Outcome::frame || image;
       link = parts.link->report();
-      if (image && link.synchronised && link.pose_messages > 0) break;
+      if (image && link.synchronised && link.poses_come) break;
     }
   }
   const Camera& camera = parts.camera.source->camera();
-  bool good = report("camera", image, fmt::format("{} x {}", camera.width, camera.height));
+  const std::string remark = image ? std::string() : parts.camera.source->remark();
+  bool good =
+      report("camera", image, remark.empty() ? fmt::format("{} x {}", camera.width, camera.height) : remark);
   report("mounting", parts.camera.mounting_stated,
          parts.camera.mounting_stated ? "from the calibration"
                                       : "taken as looking ahead from the body's origin");
@@ -117,18 +132,24 @@ Status check_parts(LiveParts& parts) {
                 link.synchronised ? fmt::format("errs by at most {:.1f} ms", 1e3 * link.clock_bound)
                                   : "no answer to TIMESYNC") &&
          good;
-  good = report("poses", link.pose_messages > 0,
-                link.refused.empty() ? fmt::format("{} messages", link.pose_messages)
-                                     : "the autopilot refused " + link.refused) &&
+  good = report("poses", link.poses_come,
+                link.refused.empty() || link.poses_come
+                    ? fmt::format("{} attitudes, {} positions", link.attitudes, link.positions)
+                    : "the autopilot refused " + link.refused) &&
          good;
   fmt::print("  {:<10} {:<8} {}\n", "link load", "", link_load(parts.options));
   return good ? Status() : Status(Error{"something is missing (see above)"});
 }
 
+/// On standard error. A log that cannot be written (its disk is full, the terminal has gone) costs the log,
+/// not the flight.
+void say(const std::string& text) { (void)std::fputs(text.c_str(), stderr); }
+
 /// A line each five seconds, for the log.
 class LiveLog {
  public:
-  void maybe(const live::Progress& progress, const live::LinkReport& link) {
+  explicit LiveLog(live::PoseMessages poses) : poses_(poses) {}
+  void maybe(const live::Progress& progress, const live::LinkReport& link, const std::string& stamps) {
     constexpr double kPause = 5;  // s
     const Time now = live::now_of_ours();
     if (seconds_between(last_, now) < kPause) return;
@@ -137,54 +158,129 @@ class LiveLog {
       return then == 0 ? std::string("none")
                        : fmt::format("{:.2f} s old", 1e-9 * static_cast<double>(now.nanoseconds - then));
     };
-    fmt::print(stderr, "{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
-               live::text_of(link.missing), age(progress.image), age(progress.depth), link.sectors_sent,
-               link.in.packets, link.in.bad, link.in.gaps);
+    say(fmt::format("{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
+                    live::text_of(link, poses_), age(progress.image), age(progress.depth), link.sectors_sent,
+                    link.in.packets, link.in.bad, link.in.gaps));
+    if (!stamps.empty()) say(stamps + "\n");
   }
 
  private:
+  live::PoseMessages poses_;
   Time last_ = live::now_of_ours();
 };
 
-void print_summary(const live::SessionCounts& counts, const live::LinkReport& link) {
-  fmt::print(
+/// Tells systemd that all threads get on, each second. Called by the mapper's thread, so that one that is
+/// stuck says nothing.
+class Pulse {
+ public:
+  Pulse(const live::ServiceManager& service, const LinkThread& link) : service_(service), link_(link) {}
+  void maybe(const live::AutopilotLink& link) {
+    constexpr double kPause = 1, kStuck = 2;  // s
+    const Time now = live::now_of_ours();
+    if (!service_.listens() || seconds_between(last_, now) < kPause) return;
+    last_ = now;
+    if (seconds_between(link_.turned(), now) < kStuck) service_.alive(live::text_of(link.report().missing));
+  }
+
+ private:
+  const live::ServiceManager& service_;
+  const LinkThread& link_;
+  Time last_;
+};
+
+std::string summary(const live::SessionCounts& counts, const live::LinkReport& link) {
+  std::string text = fmt::format(
       "{} frames: {} mapped, {} skipped, {} dropped for newer ones; {} sectors sent, {} too old to be sent\n",
       counts.frames, counts.mapped, counts.skipped, counts.dropped, link.sectors_sent, link.sectors_stale);
-  for (const auto& [reason, count] : counts.reasons) fmt::print("  skipped {}: {}\n", count, reason);
-  if (counts.restarts > 0) fmt::print("  {} maps begun anew because the poses jumped\n", counts.restarts);
-  fmt::print("link: {} packets, {} bad, {} gaps; {} packets of ours not taken\n", link.in.packets,
-             link.in.bad, link.in.gaps, link.unsent);
+  for (const auto& [reason, count] : counts.reasons) text += fmt::format("  skipped {}: {}\n", count, reason);
+  if (counts.restarts > 0)
+    text += fmt::format("  {} maps begun anew because the poses jumped\n", counts.restarts);
+  text += fmt::format("link: {} packets, {} bad, {} gaps; {} packets of ours not taken\n", link.in.packets,
+                      link.in.bad, link.in.gaps, link.unsent);
+  return text;
+}
+
+Status save_map(const live::Session& session, const live::SaverReport& meanwhile, const std::string& file) {
+  std::string text;
+  if (!meanwhile.earlier.empty()) text += fmt::format("{}: of an earlier session\n", meanwhile.earlier);
+  for (const std::string& finished : meanwhile.finished)
+    text += fmt::format("{}: until the poses jumped\n", finished);
+  if (meanwhile.failed > 0) {
+    say(fmt::format("{} times the map could not be saved meanwhile: {}\n", meanwhile.failed,
+                    meanwhile.error));
+  }
+  const live::SessionCounts& counts = session.counts();
+  if (counts.mapped == 0) return Error{"nothing was mapped, so no map is saved"};
+  if (!file.empty() && counts.mapped_anew == 0) {
+    text += fmt::format("nothing was mapped since the poses jumped, so {} is not written\n", file);
+  } else if (!file.empty()) {
+    if (Status saved = io::write_map(session.map(), file, io::Overwrite::replace); !saved) return saved;
+    const mapping::OccupancyMap::Counts voxels = session.map().counts();
+    text += fmt::format("{}: {} voxels occupied, {} free\n", file, voxels.occupied, voxels.free);
+  }
+  (void)std::fputs(text.c_str(), stdout);
+  return {};
+}
+
+/// Where the recording is, or why there is none.
+std::string recorded(live::SessionRecorder& recorder) {
+  if (const Status finished = recorder.finish(); !finished) return finished.error().message + "\n";
+  const std::size_t lost = recorder.left_out();
+  return fmt::format(
+      "{}: the frames of the map{}\n", recorder.file().string(),
+      lost > 0 ? fmt::format(", without {} that the disk was too slow for", lost) : std::string());
 }
 
 Status run_live(const LiveArguments& arguments) {
   io::watch_for_interrupts();
+  (void)std::signal(SIGHUP, SIG_IGN);  // a terminal out of radio range must not end the flight's map
   auto parts = open_parts(arguments);
   if (!parts) return parts.error();
   if (arguments.check) return check_parts(*parts);
   const live::LiveOptions& options = parts->options;
   live::Progress progress;
-  live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth);
+  const auto sight = live::SectorView::of(parts->camera.source->camera(), parts->camera.T_body_camera);
+  live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth, sight);
+  std::vector<live::Sink*> sinks{&sectors};
+  std::optional<live::MapSaver> saver;
+  if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
+  std::unique_ptr<live::SessionRecorder> recorder;
+  if (!options.record.empty()) {
+    const live::FrameSource& camera = *parts->camera.source;
+    auto made = live::SessionRecorder::create(options.record, camera.camera(), camera.mask());
+    if (!made) return made.error();
+    recorder = std::move(*made);
+  }
   auto session = live::Session::create(
-      {*parts->camera.source, *parts->link, {&sectors}, progress, parts->camera.T_body_camera},
+      {*parts->camera.source, *parts->link, sinks, progress, parts->camera.T_body_camera, recorder.get()},
       options.session, options.mapper);
   if (!session) return session.error();
+  const live::ServiceManager service;
   {
     const LinkThread thread(*parts->link, progress);
-    LiveLog log;
+    LiveLog log(options.link.poses);
+    Pulse pulse(service, thread);
+    service.ready();
     const Time start = live::now_of_ours();
     session->run([&] {
-      log.maybe(progress, parts->link->report());
+      log.maybe(progress, parts->link->report(), live::stamp_text(session->stamp_offset()));
+      pulse.maybe(*parts->link);
       const bool over =
           arguments.seconds > 0 && seconds_between(start, live::now_of_ours()) > arguments.seconds;
       return over || io::interrupted();
     });
   }
-  print_summary(session->counts(), parts->link->report());
-  if (session->counts().mapped == 0) return Error{"nothing was mapped, so no map is saved"};
-  if (options.map.empty()) return {};
-  if (Status saved = io::write_map(session->map(), options.map, io::Overwrite::replace); !saved) return saved;
-  fmt::print("{}\n", options.map);
-  return {};
+  service.stopping();
+  parts->link->end();
+  live::SaverReport meanwhile;
+  if (saver) meanwhile = saver->finish();
+  const Status saved = save_map(*session, meanwhile, options.map);
+  std::string text = summary(session->counts(), parts->link->report());
+  if (const std::string stamps = live::stamp_text(session->stamp_offset()); !stamps.empty())
+    text += stamps + "\n";
+  if (recorder != nullptr) text += recorded(*recorder);
+  (void)std::fputs(text.c_str(), stdout);
+  return saved;
 }
 
 }  // namespace
@@ -194,10 +290,11 @@ void add_live(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("live", "Map beside an autopilot: camera and MAVLink in, OBSTACLE_DISTANCE out");
   command->footer(
-      "Runs until SIGTERM or Ctrl-C, then saves the map. docs/live.md has the wiring, the autopilots' "
+      "Runs until SIGTERM or Ctrl-C, saves the map meanwhile and at the end. docs/live.md has the wiring, "
+      "the autopilots' "
       "parameters "
       "and the file.\n"
-      "What does not exist yet: poses from our own filter, recording, autosave, OBSTACLE_DISTANCE_3D, "
+      "What does not exist yet: poses from our own filter, OBSTACLE_DISTANCE_3D, "
       "signing, RTSP "
       "and video\nfiles, ROS, DDS, Foxglove, a page.");
   command->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map")

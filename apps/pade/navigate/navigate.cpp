@@ -1,5 +1,6 @@
 // `pade navigate`: a log of IMU and GNSS through the navigation filter.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <numbers>
@@ -22,9 +23,11 @@
 #include "pade/navigation/navigation_run.hpp"
 #include "pade/pipeline/checked_log.hpp"
 #include "pade/report/navigation_report.hpp"
+#include "pade/report/raw_gnss_report.hpp"
 
 #include "commands.hpp"
 #include "raw_gnss.hpp"
+#include "tight.hpp"
 
 namespace pade::cli {
 namespace {
@@ -37,6 +40,7 @@ struct NavigateArguments {
   std::string out;
   std::string gnss;
   std::string frames;
+  std::string topics;
   std::string imu = "industrial";
   std::string vehicle = "free";
   double rate = 10;
@@ -51,6 +55,8 @@ struct NavigateArguments {
   CLI::Option* velocity_latency_given = nullptr;
   CLI::Option* heading_given = nullptr;
   bool raw = false;
+  std::string raw_coupling;
+  std::string raw_gnss;
   double elevation_mask = 10;
   bool force = false;
   bool json = false;
@@ -87,6 +93,7 @@ Result<NavigationRunOptions> run_options(const NavigateArguments& arguments, con
   options.navigator.filter = navigation::FilterOptions::of(
       from_name<navigation::ImuClass>(arguments.imu).value_or(navigation::ImuClass::industrial));
   options.navigator.filter.gravity = arguments.gravity;
+  options.navigator.filter.raw_gnss = arguments.raw_coupling == "tight";
   options.navigator.gnss_lever_arm = log.gnss.lever_arm.value_or(Eigen::Vector3d::Zero());
   if (const Status mounted = set_mounting(arguments, options); !mounted) return mounted.error();
   options.navigator.gnss_position_latency = arguments.gnss_latency;
@@ -139,6 +146,38 @@ nlohmann::ordered_json summary(const NavigationRun& run, const Score& score, con
   return json;
 }
 
+gnss::PositioningOptions positioning_options(const NavigateArguments& arguments) {
+  gnss::PositioningOptions options;
+  options.elevation_mask = arguments.elevation_mask * kDegree;
+  return options;
+}
+
+/// The raw GNSS that takes the place of the log's positions and velocities; nothing where none is asked for.
+Result<std::optional<RawInput>> take_raw_gnss(const NavigateArguments& arguments, NavigationLog& log) {
+  if (arguments.raw_coupling.empty()) return std::optional<RawInput>{};
+  auto input = read_raw_input(arguments.raw_gnss.empty() ? arguments.log : arguments.raw_gnss, log.imu,
+                              positioning_options(arguments));
+  if (!input) return input.error();
+  log.gnss.fixes.clear();
+  log.gnss.velocities.clear();
+  log.gnss.origin = input->origin;
+  std::erase_if(log.remarks,
+                [](const std::string& r) { return r.find("no GNSS log found") != std::string::npos; });
+  log.remarks.push_back(input->remark);
+  log.remarks.insert(log.remarks.end(), input->log.remarks.begin(), input->log.remarks.end());
+  return std::optional<RawInput>(std::move(*input));
+}
+
+nlohmann::ordered_json json_of(const navigation::RawTally& tally) {
+  const auto counts = [](const navigation::RawCounts& c) {
+    return nlohmann::ordered_json{{"used", c.used}, {"refused", c.refused}};
+  };
+  return {{"ranges", counts(tally.ranges)},
+          {"rates", counts(tally.rates)},
+          {"phases", counts(tally.phases)},
+          {"clock_jumps", tally.clock_jumps}};
+}
+
 /// A folder, or an autopilot's recording.
 Result<CheckedLog> read_log(const NavigateArguments& arguments) {
   const bool px4 = live::is_ulog(arguments.log);
@@ -151,29 +190,41 @@ Result<CheckedLog> read_log(const NavigateArguments& arguments) {
   }
   io::NavigationLogOptions options;
   options.gnss = arguments.gnss;
+  options.topics = arguments.topics;
   return read_checked_log(arguments.log, options);
 }
 
 Status navigate(const NavigateArguments& arguments) {
   if (arguments.raw || is_raw_gnss_file(arguments.log)) {
-    gnss::PositioningOptions options;
-    options.elevation_mask = arguments.elevation_mask * kDegree;
-    return navigate_raw({arguments.log, arguments.out, options, arguments.force, arguments.json});
+    return navigate_raw(
+        {arguments.log, arguments.out, positioning_options(arguments), arguments.force, arguments.json});
   }
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kMarker);
   if (!output) return output.error();
-  const auto checked = read_log(arguments);
+  auto checked = read_log(arguments);
   if (!checked) return checked.error();
+  const auto raw = take_raw_gnss(arguments, checked->log);
+  if (!raw) return raw.error();
   const NavigationLog* const log = &checked->log;
-  const auto options = run_options(arguments, *log);
+  auto options = run_options(arguments, *log);
   if (!options) return options.error();
+  if (*raw) options->raw = (*raw)->epochs;
   const NavigationRun run = run_navigation(*log, *options);
   if (run.frames.empty()) return never_aligned(arguments.log, *checked, run);
   const std::vector<Hint> hints = all_hints(*checked, run);
   const Score score = score_motions(*log, *options, run);
   nlohmann::ordered_json json = summary(run, score, hints);
   json["remarks"] = log->remarks;
+  if (*raw) {
+    json["raw_gnss"] = json_of(run.raw);
+    const gnss::RawRun alone = gnss::run_raw((*raw)->log, positioning_options(arguments));
+    for (const auto& [file, content] :
+         {std::pair<std::string, std::string>{"residuals.csv", format_residuals(alone)},
+          {"raw_report.html", raw_report("Raw GNSS alone, epoch by epoch", (*raw)->log, alone, {})}}) {
+      if (Status written = output->write(file, content); !written) return written;
+    }
+  }
   const std::string title = "Navigation of " + std::filesystem::path(arguments.log).filename().string();
   for (const auto& [file, content] :
        {std::pair<std::string, std::string>{"trajectory.txt", format_trajectory(run)},
@@ -199,6 +250,13 @@ Status navigate(const NavigateArguments& arguments) {
     fmt::print("{}: {} measurements, {} refused, mean χ² {:.2f} per component (1 is consistent)\n",
                sensor.sensor, sensor.measurements, sensor.refused, sensor.chi_square);
   }
+  if (*raw && arguments.raw_coupling == "tight") {
+    fmt::print(
+        "satellite by satellite, used / refused: ranges {} / {}, rates {} / {}, phases {} / {}; the clock "
+        "jumped {} times\n",
+        run.raw.ranges.used, run.raw.ranges.refused, run.raw.rates.used, run.raw.rates.refused,
+        run.raw.phases.used, run.raw.phases.refused, run.raw.clock_jumps);
+  }
   if (score) {
     fmt::print(
         "against truth, frame to frame: translation {:.2f} cm median, {:.2f} cm 95 % (NEES {:.2f}); rotation "
@@ -218,11 +276,13 @@ void add_navigate(CLI::App& app, Context& context) {
   command
       ->add_option("log", arguments->log,
                    "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, a ground station's .tlog, "
-                   "or PX4's .ulg "
+                   "PX4's .ulg, a recording of ROS (.bag, .mcap, .db3) "
                    "(docs/formats.md); or raw GNSS: a file of RINEX 3 observations, UBX or libRSF ranges")
       ->required();
   command->add_option("-o,--out", arguments->out, "Output folder")->required();
   command->add_option("--gnss", arguments->gnss, "GNSS file in the folder, if there are several");
+  command->add_option("--topics", arguments->topics,
+                      "Topics of a recording that are meant where several fit, separated by blanks");
   command->add_option("--rate", arguments->rate, "Frames per second of relative_motion.csv")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
@@ -271,7 +331,22 @@ void add_navigate(CLI::App& app, Context& context) {
       ->add_option("--elevation-mask", arguments->elevation_mask,
                    "Of raw GNSS: lower satellites are not used, degrees")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 60.0));
+      ->check(CLI::Validator(
+          [](const std::string& text) {
+            const auto degrees = io::parse_number(text);
+            const bool sensible = degrees && std::isfinite(*degrees) && *degrees >= 0 && *degrees <= 60;
+            return sensible ? std::string()
+                            : fmt::format("found {}, expected 0 to 60 degrees", io::in_quotes(text));
+          },
+          "FLOAT in [0 - 60]"));
+  command
+      ->add_option("--raw-coupling", arguments->raw_coupling,
+                   "Raw GNSS beside the IMU in place of gnss.csv: tight, each satellite for itself "
+                   "(docs/navigation.md, "
+                   "section 7), or loose, the positions and velocities that come of each epoch")
+      ->check(CLI::IsMember({"loose", "tight"}));
+  command->add_option("--raw-gnss", arguments->raw_gnss,
+                      "Where that raw GNSS is, if not in the folder of the log");
   command->add_flag("--force", arguments->force, "Replace an earlier output");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->callback([arguments, &context] {

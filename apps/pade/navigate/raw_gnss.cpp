@@ -1,5 +1,7 @@
 #include "raw_gnss.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -74,11 +76,22 @@ void print_summary(const gnss::RawLog& log, const gnss::RawRun& run, const std::
   }
 }
 
+/// "x.obs", "x.rnx", "x.ubx" or "x.23o".
+bool is_named_so(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool by_year =
+      ending.size() == 4 && ending[3] == 'o' && std::isdigit(ending[1]) != 0 && std::isdigit(ending[2]) != 0;
+  return by_year || ending == ".obs" || ending == ".rnx" || ending == ".ubx";
+}
+
 }  // namespace
 
 bool is_raw_gnss_file(const std::string& path) {
   std::error_code failure;
   if (!std::filesystem::is_regular_file(path, failure)) return false;
+  if (is_named_so(path)) return true;  // what is in it is for the reader to say
   std::string start(200, '\0');
   std::ifstream stream(path, std::ios::binary);
   stream.read(start.data(), static_cast<std::streamsize>(start.size()));

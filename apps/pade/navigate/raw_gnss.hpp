@@ -16,7 +16,7 @@ struct RawGnssArguments {
   bool json = false;
 };
 
-/// Whether the path is a file of RINEX, UBX or libRSF ranges.
+/// Whether the path is a file of RINEX, UBX or libRSF ranges, or named as one of the first two.
 bool is_raw_gnss_file(const std::string& path);
 
 /// Plays the raw GNSS of a folder or file and writes the output folder.

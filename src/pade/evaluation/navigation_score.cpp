@@ -66,6 +66,9 @@ std::optional<MotionError> score(const EstimatedMotion& estimate, const std::vec
   error.estimated_baseline = estimate.motion.t_reference_other.norm();
   error.sigma = std::sqrt(estimate.motion.covariance.topLeftCorner<3, 3>().trace());
   error.nees = difference.dot(estimate.motion.covariance.topLeftCorner<3, 3>().ldlt().solve(difference));
+  Eigen::Matrix<double, 6, 1> both;  // the motion as it is less the estimate, as the covariance has it
+  both << -difference, turn;
+  error.pose_nees = both.dot(estimate.motion.covariance.ldlt().solve(both));
   score_blocks(estimate.motion, difference, T.translation, error);
   error.scale_valid = estimate.scale_valid;
   error.direction_valid = estimate.direction_valid;
@@ -93,6 +96,7 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
   double rotation_nees = 0;
   double length_nees = 0;
   double direction_nees = 0;
+  double pose_nees = 0;
   std::vector<double> direction;
   std::size_t direction_good = 0;
   std::size_t direction_good_valid = 0;
@@ -110,6 +114,7 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
     rotation_nees += error.rotation_nees;
     length_nees += error.length_nees;
     direction_nees += error.direction_nees;
+    pose_nees += error.pose_nees;
     direction.push_back(error.direction);
     if (error.length < 0.1 * error.baseline) {
       ++good;
@@ -142,6 +147,7 @@ MotionSummary summarise(const std::vector<MotionError>& errors) {
   summary.rotation_nees_mean = rotation_nees / count;
   summary.length_nees_mean = length_nees / count;
   summary.direction_nees_mean = direction_nees / count;
+  summary.pose_nees_mean = pose_nees / count;
   summary.direction_95 = quantile(direction, 0.95);
   summary.direction_good = direction_good;
   summary.direction_bad = direction_bad;

@@ -40,6 +40,7 @@ struct MotionError {
   double length_nees = 0;     ///< the same of the length, 1 degree of freedom
   double direction_nees = 0;  ///< of the error across the estimated baseline, 2 degrees of freedom
   double rotation_nees = 0;   ///< of the rotation, 3 degrees of freedom
+  double pose_nees = 0;       ///< of translation and rotation together, 6 degrees of freedom
   bool scale_valid = false;
   bool direction_valid = false;
 };
@@ -59,6 +60,7 @@ struct MotionSummary {
   double rotation_nees_mean = 0;   ///< 3 expected
   double length_nees_mean = 0;     ///< 1 expected
   double direction_nees_mean = 0;  ///< 2 expected
+  double pose_nees_mean = 0;       ///< 6 expected
   double direction_95 = 0;         ///< rad
   std::size_t good = 0;            ///< pairs whose length is wrong by less than 10 % of the baseline
   std::size_t bad = 0;             ///< by more than 20 %

@@ -23,9 +23,9 @@ std::string advice_for(const std::filesystem::path& file) {
       "them "
       "imu.csv and gnss.csv";
   constexpr std::string_view kBag =
-      "a ROS bag: write its images into rgb/ named by their times, its poses as rows `time tx ty tz qx qy qz "
-      "qw`, its "
-      "sensors as tables (rostopic echo -p) imu.csv and gnss.csv";
+      "a recording of ROS, but does not begin as one: pade map, navigate, info and convert read rosbag 2.0, "
+      "MCAP and "
+      "rosbag2's SQLite";
   constexpr std::string_view kFilm =
       "a film: write its frames into rgb/ as PNG, named by their times in seconds";
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kKinds = {

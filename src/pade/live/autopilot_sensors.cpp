@@ -32,9 +32,6 @@ Vector3d flu_from_frd(const Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
 Time from_milliseconds(std::uint32_t ms) { return {static_cast<std::int64_t>(ms) * 1'000'000}; }
 
-/// The standard atmosphere up to 11 km.
-double height_of(double hectopascal) { return 44330.77 * (1 - std::pow(hectopascal / 1013.25, 0.1902632)); }
-
 template <class Sample>
 bool repeats(const std::vector<Sample>& samples, Time time) {
   return !samples.empty() && samples.back().time == time;
@@ -147,7 +144,7 @@ void SensorGatherer::add_field(Time time, const Vector3d& frd, Source source) {
 void SensorGatherer::add_pressure(std::optional<Time> time, double hectopascal, Source source) {
   auto& samples = heights_[source];
   if (!time || repeats(samples, *time) || !(hectopascal > 100 && hectopascal < 1200)) return;
-  samples.push_back({*time, height_of(hectopascal), kHeightSigma});
+  samples.push_back({*time, io::height_of_pressure(hectopascal), kHeightSigma});
 }
 
 void SensorGatherer::add_fix(const Frame& frame) {
@@ -159,9 +156,10 @@ void SensorGatherer::add_fix(const Frame& frame) {
     ++without_fix_;
     return;
   }
-  const bool on_earth = std::abs(m->lat) <= 900'000'000 && std::abs(static_cast<double>(m->lon)) <= 1.8e9;
+  const bool on_earth =
+      std::abs(static_cast<double>(m->lat)) <= 9e8 && std::abs(static_cast<double>(m->lon)) <= 1.8e9;
   if (!time || !on_earth || repeats(fixes_, *time)) return;
-  GeodeticFix fix{
+  io::GeodeticFix fix{
       *time, 1e-7 * m->lat,       1e-7 * m->lon, kMilli * m->alt, kMilli * m->h_acc, kMilli * m->v_acc,
       {},    kMilli * m->vel_acc, false};
   if (m->vel != kUnknown && m->cog != kUnknown) {
@@ -198,7 +196,7 @@ Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
   }
   log.magnetometer = longest(fields_);
   log.barometer = longest(heights_);
-  log.gnss = local_log(fixes_, "GPS_RAW_INT", log.remarks);
+  log.gnss = io::local_log(fixes_, "GPS_RAW_INT", log.remarks);
   return log;
 }
 

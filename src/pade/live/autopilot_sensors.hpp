@@ -12,7 +12,7 @@
 #include "pade/core/result.hpp"
 #include "pade/core/sensors/navigation_log.hpp"
 #include "pade/core/time.hpp"
-#include "pade/live/geodetic_fixes.hpp"
+#include "pade/io/navigation/geodetic_fixes.hpp"
 #include "pade/live/mavlink/frame.hpp"
 
 namespace pade::live {
@@ -74,7 +74,7 @@ class SensorGatherer {
   std::array<std::vector<ImuSample>, 3> imu_;  // by source
   std::array<std::vector<MagneticField>, 3> fields_;
   std::array<std::vector<BarometricHeight>, 2> heights_;  // HIGHRES_IMU, SCALED_PRESSURE
-  std::vector<GeodeticFix> fixes_;
+  std::vector<io::GeodeticFix> fixes_;
   std::size_t unitless_ = 0;  // RAW_IMU of somebody whose units nobody knows
   std::size_t without_fix_ = 0;
 };

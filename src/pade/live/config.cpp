@@ -1,6 +1,7 @@
 #include "pade/live/config.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "pade/core/option_check.hpp"
 #include "pade/io/options_json.hpp"
@@ -24,8 +25,10 @@ fs::path calibration_of(const CameraOptions& options) {
 
 Status check(const LiveOptions& options) {
   const OptionRange ranges[] = {
-      {"camera.rate", options.camera.rate, 0.1, 1000},
-      {"link.pose_rate", options.link.pose_rate, 1, 1000},
+      // Slower images are missing half of the time, slower poses leave gaps that nothing is put into.
+      {"camera.rate", options.camera.rate, 5, 1000},
+      {"autosave", options.autosave, 0, 3600},
+      {"link.pose_rate", options.link.pose_rate, 5, 1000},
       {"link.baud", static_cast<double>(options.link.baud), 9600, 2'000'000},
   };
   if (const Status status = check_ranges(ranges); !status) return status;
@@ -34,7 +37,23 @@ Status check(const LiveOptions& options) {
   const bool known = options.map.empty() || options.map.ends_with(".bt") || options.map.ends_with(".ot");
   if (!known)
     return Error{fmt::format("map: found \"{}\", expected a name that ends in .bt or .ot", options.map)};
+  const bool recordable =
+      options.record.empty() || options.record.ends_with(".mcap") || options.record.ends_with(".bag");
+  if (!recordable)
+    return Error{
+        fmt::format("record: found \"{}\", expected a name that ends in .mcap or .bag", options.record)};
   return within("mapper", check(options.mapper));
+}
+
+Status check_place_of_map(const std::string& map) {
+  if (map.empty()) return {};
+  std::error_code failed;
+  const fs::path folder = fs::absolute(map, failed).parent_path();
+  if (failed || !fs::is_directory(folder, failed))
+    return Error{fmt::format("map: {}: found no folder {}, expected one that exists", map, folder.string())};
+  if (::access(folder.c_str(), W_OK) != 0)
+    return Error{fmt::format("map: {}: the folder {} cannot be written to", map, folder.string())};
+  return {};
 }
 
 Result<LiveOptions> read_live_options(const fs::path& file) {

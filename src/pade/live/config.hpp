@@ -47,7 +47,9 @@ struct LiveOptions {
   SessionOptions session;
   SectorOptions sectors;
   ObstacleMapperOptions mapper;
-  std::string map = "map.bt";  ///< where the map is saved at the end; empty: nowhere
+  std::string map = "map.bt";  ///< where the map is saved; empty: nowhere
+  double autosave = 10;        ///< s between one save and the next; 0: only at the end
+  std::string record;          ///< MCAP file of what is mapped; empty: none
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -56,11 +58,16 @@ struct LiveOptions {
     field("session", self.session, "how frames and poses meet");
     field("sectors", self.sectors, "what is sent as OBSTACLE_DISTANCE");
     field("mapper", self.mapper, "depth and map");
-    field("map", self.map, "file (.bt, .ot) that the map is saved to at the end; empty: nowhere");
+    field("map", self.map, "file (.bt, .ot) that the map is saved to; empty: nowhere");
+    field("autosave", self.autosave, "between one save and the next, s; 0 = only at the end");
+    field("record", self.record, "file (.mcap, .bag) that what is mapped is recorded in; empty: none");
   }
 };
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const LiveOptions& options);
+
+/// Whether a map could be saved there: known before the flight rather than after it.
+Status check_place_of_map(const std::string& map);
 
 /// Reads the YAML of a session. Errors name file, line and field.
 Result<LiveOptions> read_live_options(const std::filesystem::path& file);

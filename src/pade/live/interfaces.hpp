@@ -42,6 +42,8 @@ class FrameSource {
   [[nodiscard]] virtual const Camera& camera() const = 0;
   /// CV_8UC1, 0 where no frame sees anything; empty: all valid.
   [[nodiscard]] virtual cv::Mat mask() const = 0;
+  /// Why no frame comes, where it is known; the thread of next().
+  [[nodiscard]] virtual std::string remark() const { return {}; }
 };
 
 /// Where the vehicle was. Any thread.
@@ -54,8 +56,6 @@ class NavigationSource {
 
   /// The pose of the body at a time.
   [[nodiscard]] virtual PoseAnswer pose_at(Time time) const = 0;
-  /// How often poses have jumped: what is before and after does not belong together.
-  [[nodiscard]] virtual std::size_t jumps() const = 0;
 };
 
 /// What a frame has changed.
@@ -64,6 +64,27 @@ struct LiveUpdate {
   Pose T_world_body;                             ///< in the map's world
   std::shared_ptr<const mapping::MapView> view;  ///< constant; may be kept
   double depth_share = 0;                        ///< of the pixels that have a depth
+};
+
+/// A frame as it goes into the mapper.
+struct MapperInput {
+  cv::Mat image;  ///< as LiveFrame::image
+  Time time;
+  Pose T_world_camera;
+  Matrix6d covariance;  ///< of the motion since the frame before (Frame::motion_covariance)
+};
+
+/// Takes what is mapped. Called by the mapper's thread, so it must not wait.
+class InputSink {
+ public:
+  InputSink() = default;
+  InputSink(const InputSink&) = delete;
+  InputSink& operator=(const InputSink&) = delete;
+  virtual ~InputSink() = default;
+
+  virtual void take(const MapperInput& input) = 0;
+  /// The poses have jumped: what comes now is another map.
+  virtual void begin_anew() = 0;
 };
 
 /// Takes results. Called by the mapper's thread, so it must not wait.
@@ -75,6 +96,8 @@ class Sink {
   virtual ~Sink() = default;
 
   virtual void take(const LiveUpdate& update) = 0;
+  /// The poses have jumped: what comes from now on is in another world, and the map is empty.
+  virtual void begin_anew() {}
 };
 
 }  // namespace pade::live

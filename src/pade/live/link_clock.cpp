@@ -55,15 +55,19 @@ void LinkClock::choose(Time now) {
   ready_ = ready_ || samples_.size() >= kEnough;
 }
 
-bool LinkClock::synchronised() const { return ready_; }
+bool LinkClock::synchronised(Time now) const {
+  constexpr double kExpires = 10;  // s
+  return ready_ && seconds_between(samples_.back().received, now) < kExpires;
+}
 
 std::optional<Time> LinkClock::to_ours(Time autopilot) const {
   if (!ready_) return std::nullopt;
-  return Time{autopilot.nanoseconds - best_->offset};
+  const Time ours{autopilot.nanoseconds - best_->offset};
+  return synchronised(ours) ? std::optional(ours) : std::nullopt;
 }
 
 std::optional<Time> LinkClock::to_autopilot(Time ours) const {
-  if (!ready_) return std::nullopt;
+  if (!synchronised(ours)) return std::nullopt;
   return Time{ours.nanoseconds + best_->offset};
 }
 

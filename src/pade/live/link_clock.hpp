@@ -20,11 +20,13 @@ class LinkClock {
   /// @param received  our clock when the answer had come
   void add(Time asked, Time answered, Time received);
 
-  /// Whether enough answers have come since the start, or since the clock was last found to have jumped.
-  [[nodiscard]] bool synchronised() const;
-  /// A moment of the autopilot's clock on ours. Empty before synchronised().
+  /// Whether enough answers have come since the start, or since the clock was last found to have jumped, and
+  /// the last of them not more than 10 s ago.
+  /// @param now  ours
+  [[nodiscard]] bool synchronised(Time now) const;
+  /// A moment of the autopilot's clock on ours. Empty where it is not synchronised then.
   [[nodiscard]] std::optional<Time> to_ours(Time autopilot) const;
-  /// Of ours on the autopilot's. Empty before synchronised().
+  /// Of ours on the autopilot's. Empty where it is not synchronised then.
   [[nodiscard]] std::optional<Time> to_autopilot(Time ours) const;
   /// Half of the round trip that counts: no error is greater but by drift, s. 0 without an answer.
   [[nodiscard]] double bound() const;

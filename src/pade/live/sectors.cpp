@@ -41,11 +41,16 @@ struct BinRange {
 /// What is known so far, bin by bin.
 class Bins {
  public:
-  Bins(const Pose& T_world_body, double voxel, const SectorOptions& options)
-      : place_(T_world_body.translation), voxel_(voxel), options_(options) {
+  Bins(const Pose& T_world_body, double voxel, const SectorOptions& options, const SectorView& sight)
+      : place_(T_world_body.translation), voxel_(voxel), options_(options), sight_(sight) {
     const Vector3d forward = T_world_body.rotation * Vector3d::UnitX();
     heading_ = std::atan2(forward.y(), forward.x());
     nearest_.fill(std::numeric_limits<double>::infinity());
+    for (std::size_t k = 0; k < kBins; ++k) {
+      const double low = kBinAngle * static_cast<double>(k) - kBinAngle;
+      seen_[k] =
+          sight.half >= 180 || (in_sight(low) && in_sight(low + kBinAngle) && in_sight(low + 3 * kBinAngle));
+    }
   }
 
   /// Whether a square of voxels (lower corner, voxels to a side) can say anything new.
@@ -54,7 +59,8 @@ class Bins {
     if (square.distance > options_.max_distance) return false;
     bool matters = false;
     square.bins.for_each([&](std::size_t k) {
-      matters = matters || (occupied && square.distance < nearest_[k]) || (unknown && seen_[k]);
+      matters =
+          matters || (occupied && square.in_sight && square.distance < nearest_[k]) || (unknown && seen_[k]);
     });
     return matters;
   }
@@ -63,7 +69,7 @@ class Bins {
     if (square.distance > options_.max_distance) return;
     const bool hides = unknown && square.distance >= options_.own_radius;
     square.bins.for_each([&](std::size_t k) {
-      if (occupied) nearest_[k] = std::min(nearest_[k], square.distance);
+      if (occupied && square.in_sight) nearest_[k] = std::min(nearest_[k], square.distance);
       if (hides) seen_[k] = false;
     });
   }
@@ -97,22 +103,33 @@ class Bins {
         right = std::min(right, angle);
       }
       const double bearing = std::remainder(from.heading_ - middle, 2 * std::numbers::pi);
-      bins = BinRange::of(kDegrees * (bearing - left), kDegrees * (bearing - right));
+      const double low = kDegrees * (bearing - left);
+      const double high = kDegrees * (bearing - right);
+      bins = BinRange::of(low, high);
+      in_sight = from.touches_sight(low, high);
     }
     double distance = 0;
+    bool in_sight = true;  ///< or at its edge
     BinRange bins;
   };
+
+  [[nodiscard]] bool in_sight(double bearing) const {
+    return std::abs(std::remainder(bearing - sight_.middle, 360)) <= sight_.half;
+  }
+  /// Anything between two bearings, high - low < 180.
+  [[nodiscard]] bool touches_sight(double low, double high) const {
+    if (sight_.half >= 180) return true;
+    const double middle = std::remainder((low + high) / 2 - sight_.middle, 360);
+    return std::abs(middle) <= sight_.half + (high - low) / 2;
+  }
 
   Vector3d place_;
   double heading_ = 0;  // from east towards north, rad
   double voxel_;
   SectorOptions options_;
+  SectorView sight_;
   std::array<double, kBins> nearest_{};
-  std::array<bool, kBins> seen_ = [] {
-    std::array<bool, kBins> all{};
-    all.fill(true);
-    return all;
-  }();
+  std::array<bool, kBins> seen_{};
 };
 
 /// Voxels of a column of tiles from above: bit 8 y + x.
@@ -151,21 +168,40 @@ std::vector<Column> columns_between(const VoxelIndex& low, const VoxelIndex& hig
 }  // namespace
 
 Status check(const SectorOptions& options) {
-  constexpr double kFarthest = 650;  // m: the greatest that 16 bits of centimetres hold
+  constexpr double kFarthest = 100;  // m
   const OptionRange ranges[] = {
       {"sectors.min_distance", options.min_distance, 0.01, kFarthest},
       {"sectors.max_distance", options.max_distance, options.min_distance + 0.01, kFarthest},
       {"sectors.below", options.below, 0, 100},
       {"sectors.above", options.above, 0, 100},
-      {"sectors.own_radius", options.own_radius, 0, 10},
+      // Nobody has seen what lies within: it must not be all that counts.
+      {"sectors.own_radius", options.own_radius, 0, std::min(3.0, options.max_distance / 2)},
   };
   return check_ranges(ranges);
 }
 
+SectorView SectorView::of(const Camera& camera, const Pose& T_body_camera) {
+  constexpr double kLevel = 0.2;  // least share of a direction that is horizontal
+  const auto bearing = [&](double x, bool& is_level) {
+    const Vector3d ray(  // of the middle row
+        (x - camera.cx) / camera.fx, 0, 1);
+    const Vector3d d = (T_body_camera.rotation * ray).normalized();
+    is_level = is_level && std::hypot(d.x(), d.y()) > kLevel;
+    return kDegrees * std::atan2(-d.y(), d.x());
+  };
+  bool is_level = true;
+  const double middle = bearing(camera.cx, is_level);
+  const double left = bearing(-0.5, is_level);
+  const double right = bearing(camera.width - 0.5, is_level);
+  if (!is_level) return {0, 0};
+  return {middle, std::min(std::abs(std::remainder(left - middle, 360)),
+                           std::abs(std::remainder(right - middle, 360)))};
+}
+
 std::array<std::uint16_t, kBins> obstacle_distances(const mapping::MapView& view, const Pose& T_world_body,
-                                                    const SectorOptions& options) {
+                                                    const SectorOptions& options, const SectorView& sight) {
   const mapping::TileTree& tiles = view.tiles();
-  Bins bins(T_world_body, tiles.voxel, options);
+  Bins bins(T_world_body, tiles.voxel, options, sight);
   const Vector3d& place = T_world_body.translation;
   const double reach = options.max_distance;
   const VoxelIndex low = mapping::voxel_beside(place - Vector3d(reach, reach, options.below), tiles.voxel);

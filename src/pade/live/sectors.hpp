@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "pade/core/camera.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
@@ -42,15 +43,28 @@ struct SectorOptions {
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const SectorOptions& options);
 
+/// The bearings that a camera sees, clockwise from the body's x axis.
+struct SectorView {
+  double middle = 0;  ///< degrees
+  double half = 180;  ///< to each side of it, degrees; 180: all around, 0: nothing
+
+  /// What a camera sees along the middle row of its image while the body is level; nothing where that row
+  /// does not cross the horizon's plane (a camera that looks down).
+  static SectorView of(const Camera& camera, const Pose& T_body_camera);
+};
+
 /// Horizontal distances to the nearest occupied voxel of a level slab, in cm, rounded down.
 ///
 /// Bin k is centred at the bearing 5 k degrees, clockwise from the body's x axis, and covers from 5 k - 5 to
 /// 5 k + 10: so wide that neither PX4, which reads every other bin, nor ArduPilot, which takes a bin for the
 /// 45° face of its middle, loses an obstacle. `max_distance` + 1 is sent only where every voxel of the bin
-/// was seen and is free; else, without an obstacle, kUnknownDistance.
+/// was seen and is free; else, without an obstacle, kUnknownDistance. What lies outside the view does not
+/// count: what the map remembers there may be old. So bins outside it are unknown, and those at its edge are
+/// never free.
 /// @param T_world_body  world ENU, body FLU; of the attitude only the heading counts
 std::array<std::uint16_t, kBins> obstacle_distances(const mapping::MapView& view, const Pose& T_world_body,
-                                                    const SectorOptions& options);
+                                                    const SectorOptions& options,
+                                                    const SectorView& sight = {});
 
 /// The same as a message in the body's frame.
 mavlink::ObstacleDistance obstacle_distance_message(const std::array<std::uint16_t, kBins>& distances,

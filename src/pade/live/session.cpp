@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include <fmt/format.h>
 #include <opencv2/core.hpp>
 
 #include "pade/core/option_check.hpp"
@@ -55,29 +58,80 @@ class NewestFrame {
   bool ended_ = false;
 };
 
+/// Lets somebody run until the end of the scope, whatever ends it.
+class CameraThread {
+ public:
+  template <class Work>
+  explicit CameraThread(const Work& work) : thread_([this, work] { work(over_); }) {}
+  CameraThread(const CameraThread&) = delete;
+  CameraThread& operator=(const CameraThread&) = delete;
+  ~CameraThread() { end(); }
+  void end() {
+    over_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+
+ private:
+  std::atomic<bool> over_{false};
+  std::thread thread_;
+};
+
+/// Makes room without taking away the frame whose pose will come next: of the others that wait goes the one
+/// whose neighbours are closest to each other.
+void thin_out(std::vector<LiveFrame>& waiting, Time newest) {
+  std::size_t go = 1;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < waiting.size(); ++i) {
+    const double gap =
+        seconds_between(waiting[i - 1].time, i + 1 < waiting.size() ? waiting[i + 1].time : newest);
+    if (gap < least) {
+      least = gap;
+      go = i;
+    }
+  }
+  waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(go));
+}
+
 double share_with_depth(const DepthImage& image) {
   if (image.empty()) return 0;
-  const double pixels = static_cast<double>(image.depth.total());
-  return cv::countNonZero(image.depth == image.depth) / pixels;  // NaN is not equal to itself
+  std::size_t known = 0;
+  for (int v = 0; v < image.depth.rows; ++v) {
+    const auto* row = image.depth.ptr<float>(v);
+    known += static_cast<std::size_t>(
+        std::count_if(row, row + image.depth.cols, [](float depth) { return !std::isnan(depth); }));
+  }
+  return static_cast<double>(known) / static_cast<double>(image.depth.total());
 }
 
 }  // namespace
 
 Status check(const SessionOptions& options) {
   const OptionRange ranges[] = {
-      {"session.hold", options.hold, 0, 2},
+      {"session.hold", options.hold, 0.02, 2},
       {"session.time_offset", options.time_offset, -1, 1},
       {"session.velocity_sigma", options.velocity_sigma, 0, 100},
       {"session.rotation_sigma", options.rotation_sigma, 0, 1},
-      {"session.least_depth", options.least_depth, 0, 1},
+      {"session.least_depth", options.least_depth, 0.001, 1},
   };
   return check_ranges(ranges);
 }
 
 void SectorSink::take(const LiveUpdate& update) {
   if (update.depth_share < least_depth_) return;
-  const auto distances = obstacle_distances(*update.view, update.T_world_body, options_);
-  link_.offer(obstacle_distance_message(distances, update.time, options_), update.time);
+  const auto distances = obstacle_distances(*update.view, update.T_world_body, options_, view_);
+  const bool says_anything =
+      std::any_of(distances.begin(), distances.end(), [](std::uint16_t d) { return d != kUnknownDistance; });
+  std::optional<mavlink::ObstacleDistance> message;
+  if (says_anything) message = obstacle_distance_message(distances, update.time, options_);
+  link_.offer(message, update.time);
+}
+
+std::string stamp_text(const std::optional<StampOffset>& offset) {
+  if (!offset || !offset->is_certain()) return {};
+  return fmt::format(
+      "the images' stamps are {:.1f} ms {} (1 sigma {:.1f} ms): add {:.4f} to session.time_offset",
+      1e3 * std::abs(offset->seconds), offset->seconds < 0 ? "late" : "early", 1e3 * offset->sigma,
+      offset->seconds);
 }
 
 Result<Session> Session::create(const SessionParts& parts, const SessionOptions& options,
@@ -89,8 +143,7 @@ Result<Session> Session::create(const SessionParts& parts, const SessionOptions&
 
 void Session::run(const std::function<bool()>& stop) {
   NewestFrame newest;
-  std::atomic<bool> over{false};
-  std::thread camera([&] {
+  CameraThread camera([&](const std::atomic<bool>& over) {
     constexpr int kPatience = 50;  // ms
     while (!over) {
       LiveFrame frame;
@@ -103,24 +156,22 @@ void Session::run(const std::function<bool()>& stop) {
     newest.end();
   });
   std::vector<LiveFrame> waiting;
+  std::size_t thinned = 0;
   while (!stop() && !(newest.ended() && waiting.empty())) {
     parts_.progress.mapper = now_of_ours().nanoseconds;
     if (auto frame = newest.take(std::chrono::milliseconds(waiting.empty() ? 20 : 2))) {
       if (waiting.size() == kMostWaiting) {
-        waiting.erase(waiting.begin());
-        skip("no pose in time");
+        thin_out(waiting, frame->time);
+        ++thinned;
       }
       waiting.push_back(std::move(*frame));
     }
-    while (map_next(waiting, now_of_ours())) {
-      parts_.progress.mapper = now_of_ours().nanoseconds;
-    }
+    map_next(waiting, now_of_ours());
   }
-  over = true;
-  camera.join();
+  camera.end();
   for (std::size_t i = 0; i < waiting.size(); ++i) skip("the session ended");
   counts_.frames = newest.frames();
-  counts_.dropped = newest.dropped();
+  counts_.dropped += newest.dropped() + thinned;
   counts_.dropped += newest.take(std::chrono::milliseconds(0)) ? 1U : 0U;
 }
 
@@ -129,20 +180,40 @@ void Session::skip(const std::string& reason) {
   ++counts_.reasons[reason];
 }
 
+PoseAnswer Session::pose_of(const LiveFrame& frame) const {
+  return parts_.poses.pose_at(
+      {frame.time.nanoseconds + static_cast<std::int64_t>(options_.time_offset * 1e9)});
+}
+
+/// Frames that have their poses are mapped in their order as long as the newest of them will still be worth
+/// sending; of those before it that take too long the oldest go.
+void Session::pass_over_old(std::vector<LiveFrame>& waiting, Time now) {
+  constexpr double kInTime = 0.25;  // s
+  std::size_t known = 0;
+  while (known < waiting.size() && pose_of(waiting[known]).kind == PoseAnswer::Kind::valid) ++known;
+  while (known > 1 &&
+         seconds_between(waiting[known - 1].time, now) + static_cast<double>(known) * busy_ > kInTime) {
+    waiting.erase(waiting.begin());
+    ++counts_.dropped;
+    --known;
+  }
+}
+
 /// Maps or skips the oldest of the frames that wait; false if it has to wait on, or if there is none.
 bool Session::map_next(std::vector<LiveFrame>& waiting, Time now) {
+  pass_over_old(waiting, now);
   if (waiting.empty()) return false;
   const LiveFrame& frame = waiting.front();
-  const std::size_t jumps = parts_.poses.jumps();
-  const Time asked{frame.time.nanoseconds + static_cast<std::int64_t>(options_.time_offset * 1e9)};
-  const PoseAnswer answer = parts_.poses.pose_at(asked);
+  const PoseAnswer answer = pose_of(frame);
   if (answer.kind == PoseAnswer::Kind::not_yet && seconds_between(frame.time, now) < options_.hold) {
     return false;
   }
-  if (jumps != jumps_) begin_anew();
-  jumps_ = jumps;
   if (answer.kind == PoseAnswer::Kind::valid) {
+    if (answer.jumps != jumps_) begin_anew();
+    jumps_ = answer.jumps;
     map_frame(frame, answer.T_world_body);
+    const double took = seconds_between(now, now_of_ours());
+    busy_ = busy_ > 0 ? 0.7 * busy_ + 0.3 * took : took;
   } else {
     skip(answer.kind == PoseAnswer::Kind::never ? std::string(answer.why) : "no pose in time");
   }
@@ -156,7 +227,10 @@ void Session::begin_anew() {
   if (!made) return;  // as at the start, where it was possible
   mapper_ = std::move(*made);
   view_.reset();
+  if (parts_.recorder != nullptr) parts_.recorder->begin_anew();
+  counts_.mapped_anew = 0;
   ++counts_.restarts;
+  for (Sink* const sink : parts_.sinks) sink->begin_anew();
 }
 
 void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
@@ -164,14 +238,19 @@ void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
   const double way = options_.velocity_sigma * std::clamp(seconds_between(last_, frame.time), 0.0, 1.0);
   covariance.diagonal().head<3>().setConstant(way * way);
   covariance.diagonal().tail<3>().setConstant(options_.rotation_sigma * options_.rotation_sigma);
-  const MapperUpdate& update =
-      mapper_.add(frame.image, frame.time, camera_pose(T_world_body, parts_.T_body_camera), covariance);
+  const Pose T_world_camera = camera_pose(T_world_body, parts_.T_body_camera);
+  if (parts_.recorder != nullptr)
+    parts_.recorder->take({frame.image, frame.time, T_world_camera, covariance});
+  const MapperUpdate& update = mapper_.add(frame.image, frame.time, T_world_camera, covariance);
   if (update.outcome == MapperUpdate::Outcome::skipped) {
-    skip(update.reason);
+    if (view_ && !update.change.touched.empty())
+      view_ = view_->after(mapper_.map(), update.change);                      // what it forgot
+    skip(update.reason.substr(0, update.reason.find_first_of("0123456789")));  // one count for each kind
     return;
   }
   last_ = frame.time;
   ++counts_.mapped;
+  ++counts_.mapped_anew;
   if (update.outcome != MapperUpdate::Outcome::mapped) return;
   view_ = view_ ? view_->after(mapper_.map(), update.change) : mapping::MapView::of(mapper_.map());
   const double share = share_with_depth(update.depth);

@@ -4,9 +4,12 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "pade/core/health.hpp"
 #include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/result.hpp"
@@ -46,6 +49,7 @@ struct SessionCounts {
   std::size_t dropped = 0;                     ///< for newer ones
   std::size_t skipped = 0;                     ///< without a pose, or unusable
   std::size_t mapped = 0;                      ///< all others, with the first of a map
+  std::size_t mapped_anew = 0;                 ///< of these, since the poses last jumped
   std::size_t restarts = 0;                    ///< maps begun anew because the poses jumped
   std::map<std::string, std::size_t> reasons;  ///< of those skipped
 };
@@ -53,14 +57,17 @@ struct SessionCounts {
 /// Sectors to an autopilot, of each frame that gave depth.
 class SectorSink : public Sink {
  public:
-  SectorSink(AutopilotLink& link, const SectorOptions& options, double least_depth)
-      : link_(link), options_(options), least_depth_(least_depth) {}
+  /// @param view  what the camera sees of the bearings around the vehicle; of others nothing is said
+  SectorSink(AutopilotLink& link, const SectorOptions& options, double least_depth,
+             const SectorView& view = {})
+      : link_(link), options_(options), least_depth_(least_depth), view_(view) {}
   void take(const LiveUpdate& update) override;
 
  private:
   AutopilotLink& link_;
   SectorOptions options_;
   double least_depth_;
+  SectorView view_;
 };
 
 /// What a session works with; all must outlive it.
@@ -68,9 +75,14 @@ struct SessionParts {
   FrameSource& camera;
   const NavigationSource& poses;
   std::vector<Sink*> sinks;
-  Progress& progress;  ///< written here, read by a link
-  Pose T_body_camera;  ///< mounting of the camera
+  Progress& progress;             ///< written here, read by a link
+  Pose T_body_camera;             ///< mounting of the camera
+  InputSink* recorder = nullptr;  ///< what is mapped goes there as well
 };
+
+/// "the images' stamps are 12.0 ms late (1 sigma 0.5 ms): add -0.0120 to session.time_offset" if that is
+/// certain, else empty.
+std::string stamp_text(const std::optional<StampOffset>& offset);
 
 /// Owns the mapper. One thread but where it says otherwise.
 class Session {
@@ -85,12 +97,18 @@ class Session {
 
   [[nodiscard]] const mapping::OccupancyMap& map() const { return mapper_.map(); }
   [[nodiscard]] const SessionCounts& counts() const { return counts_; }
+  /// What the images say of their stamps against those of the poses.
+  [[nodiscard]] const std::optional<StampOffset>& stamp_offset() const {
+    return mapper_.health().stamp_offset;
+  }
 
  private:
   Session(const SessionParts& parts, const SessionOptions& options, const ObstacleMapperOptions& mapper,
           ObstacleMapper made)
       : parts_(parts), options_(options), mapper_options_(mapper), mapper_(std::move(made)) {}
   bool map_next(std::vector<LiveFrame>& waiting, Time now);
+  void pass_over_old(std::vector<LiveFrame>& waiting, Time now);
+  [[nodiscard]] PoseAnswer pose_of(const LiveFrame& frame) const;
   void map_frame(const LiveFrame& frame, const Pose& T_world_body);
   void skip(const std::string& reason);
   void begin_anew();
@@ -101,7 +119,8 @@ class Session {
   ObstacleMapper mapper_;
   std::shared_ptr<const mapping::MapView> view_;
   std::size_t jumps_ = 0;
-  Time last_;  // frame that was mapped
+  double busy_ = 0;  // that a frame took lately, s
+  Time last_;        // frame that was mapped
   SessionCounts counts_;
 };
 

@@ -38,6 +38,32 @@ Matrix3d attitude_covariance(const Quaterniond& R, double tilt_sigma, double yaw
   return rotation.transpose() * variance.asDiagonal() * rotation;
 }
 
+/// The velocity of the antenna that a measurement gives, if it gives one.
+std::optional<GnssVelocity> velocity_in(const Measurement& m) {
+  if (m.kind == SensorKind::raw_gnss) return m.raw->velocity;
+  if (m.kind != SensorKind::gnss_velocity) return std::nullopt;
+  return GnssVelocity{m.time, m.value, m.covariance};
+}
+
+std::optional<GnssFix> fix_in(const Measurement& m) {
+  if (m.kind == SensorKind::raw_gnss) return m.raw->fix;
+  if (m.kind != SensorKind::gnss_position) return std::nullopt;
+  return GnssFix{m.time, m.value, m.covariance};
+}
+
+/// The last velocity or fix in [from, to], with its stamp on the filter's time scale.
+template <class Get>
+auto last_gnss(const Timeline& timeline, Time from, Time to, const Get& get) {
+  for (std::size_t i = timeline.measurements.count_until(to);
+       i-- > 0 && timeline.measurements[i].time >= from;) {
+    if (auto found = get(timeline.measurements[i])) {
+      found->time = timeline.measurements[i].time;
+      return found;
+    }
+  }
+  return decltype(get(timeline.measurements[0])){};
+}
+
 /// The last measurement of a kind in [from, to].
 const Measurement* last_of(const Timeline& timeline, SensorKind kind, Time from, Time to) {
   for (std::size_t i = timeline.measurements.count_until(to);
@@ -94,8 +120,10 @@ std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const A
   for (std::size_t i = timeline.measurements.count_until(now);
        i-- > 0 && timeline.measurements[i].time > from;) {
     const Measurement& m = timeline.measurements[i];
-    if (m.kind != SensorKind::gnss_velocity) continue;
-    if (m.value.norm() > options.rest_speed + 3 * std::sqrt(m.covariance.trace())) return std::nullopt;
+    const auto velocity = velocity_in(m);
+    if (!velocity) continue;
+    if (velocity->velocity.norm() > options.rest_speed + 3 * std::sqrt(velocity->covariance.trace()))
+      return std::nullopt;
   }
   return RestMeans{now, rate, force, options.level_time};
 }
@@ -156,18 +184,17 @@ bool Alignment::start_from_rest(Timeline& timeline, Time now) {
 }
 
 bool Alignment::is_moving(const Timeline& timeline, Time now) const {
-  const Measurement* last = last_of(timeline, SensorKind::gnss_velocity, earlier(now, 0.5), now);
-  return last != nullptr &&
-         last->value.norm() > options_.rest_speed + 3 * std::sqrt(last->covariance.trace());
+  const auto last = last_gnss(timeline, earlier(now, 0.5), now, velocity_in);
+  return last && last->velocity.norm() > options_.rest_speed + 3 * std::sqrt(last->covariance.trace());
 }
 
 bool Alignment::start_in_motion(Timeline& timeline, Time now) {
   // Two velocities a window apart: R_0 Δv = v_1 - v_0 - g T gives the direction of "up" as the body felt it.
-  const Measurement* last = last_of(timeline, SensorKind::gnss_velocity, earlier(now, 0.5), now);
-  if (last == nullptr) return false;
+  const auto last = last_gnss(timeline, earlier(now, 0.5), now, velocity_in);
+  if (!last) return false;
   const Time from = earlier(last->time, options_.motion_window);
-  const Measurement* first = last_of(timeline, SensorKind::gnss_velocity, earlier(from, 0.5), from);
-  if (first == nullptr) return false;
+  const auto first = last_gnss(timeline, earlier(from, 0.5), from, velocity_in);
+  if (!first) return false;
   const std::size_t begin = timeline.imu.count_until(first->time);
   const std::size_t end = timeline.imu.count_until(last->time);
   if (begin == 0 || end < begin + 5) return false;
@@ -182,14 +209,14 @@ bool Alignment::start_in_motion(Timeline& timeline, Time now) {
   }
   const FilterOptions& filter_options = bank_.front().filter.options();
   const Vector3d up =
-      last->value - first->value + Vector3d(0, 0, filter_options.gravity * increment.duration);
+      last->velocity - first->velocity + Vector3d(0, 0, filter_options.gravity * increment.duration);
   const double spacing = 2 * std::numbers::pi / static_cast<double>(bank_.size());
   for (std::size_t i = 0; i < bank_.size(); ++i) {
     NavigationState state;
     state.time = time;
     const Quaterniond R0 = attitude(increment.v, up, static_cast<double>(i) * spacing);
     state.X.R = (R0 * Quaterniond(increment.R)).normalized();
-    state.X.v = last->value;
+    state.X.v = last->velocity;
     const double tilt = std::hypot(kMotionTiltSigma, kMotionForceDoubt / filter_options.gravity);
     const double velocity_sigma = std::sqrt(last->covariance.trace());
     bank_[i].filter.start(state, prior(filter_options, state.X.R, tilt, 0.6 * spacing, velocity_sigma));
@@ -228,12 +255,12 @@ AlignmentPhase Alignment::update(Timeline& timeline, Time now) {
 
 void Alignment::begin_at_first_fix(const Timeline& timeline, Time until) {
   // Far from the origin the gate of the first fix would close.
-  const Measurement* fix = last_of(timeline, SensorKind::gnss_position, Time{INT64_MIN}, until);
-  if (fix == nullptr) return;
+  const auto fix = last_gnss(timeline, Time{INT64_MIN}, until, fix_in);
+  if (!fix) return;
   for (Hypothesis& hypothesis : bank_) {
     if (!hypothesis.alive) continue;
     FilterSnapshot snapshot = hypothesis.filter.snapshot();
-    snapshot.state.X.p = fix->value;
+    snapshot.state.X.p = fix->position;
     // Nor must an almost unknown position meet a barometer: it would tie height to all that moves the
     // horizon.
     snapshot.P.block<3, 3>(kRho, kRho) =

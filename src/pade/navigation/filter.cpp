@@ -47,13 +47,14 @@ void Filter::start(const NavigationState& state, const BaseMatrix& covariance) {
   core_.state = state;
   core_.position_accepted = core_.velocity_accepted = state.time;
   clones_ = 0;
-  P_ = covariance;
+  P_.setZero(common(), common());
+  P_.topLeftCorner<kBase, kBase>() = covariance;
 }
 
 FilterSnapshot Filter::snapshot() const {
   FilterSnapshot snapshot;
   static_cast<FilterCore&>(snapshot) = core_;
-  snapshot.P = P_.topLeftCorner<kBase, kBase>();
+  snapshot.P = P_.topLeftCorner(common(), common());
   return snapshot;
 }
 
@@ -65,7 +66,7 @@ void Filter::restore(const FilterSnapshot& snapshot) {
 
 void Filter::drop_clones() {
   clones_ = 0;
-  P_.conservativeResize(kBase, kBase);
+  P_.conservativeResize(common(), common());
 }
 
 BaseMatrix Filter::covariance() {
@@ -156,6 +157,7 @@ void Filter::flush() {
   core_.state.iron *= iron_decay;
 
   P_.bottomLeftCorner(rest, kCore) = P_.topRightCorner(kCore, rest).transpose();
+  if (options_.raw_gnss) flush_receiver(T);
   core_.pending = {};
 }
 
@@ -201,8 +203,9 @@ template Innovation Filter::correct<3>(const Prediction<3>&, const Vector3d&, Ma
 void Filter::apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1>& error) {
   const ExtendedPose before = core_.state.X;
   core_.state.retract(error.head<kBase>());
+  if (options_.raw_gnss) core_.raw.receiver.retract(error.segment<kRawStates>(kBase));
   for (int i = 0; i < clones_; ++i) {
-    const auto xi = error.segment<6>(kBase + 6 * i);
+    const auto xi = error.segment<6>(clone_at(i));
     Pose& pose = clone_poses_[static_cast<std::size_t>(i)];
     const Vector3d phi = xi.head<3>();
     pose = pose * Pose{rotation_exp(phi), left_jacobian(phi) * xi.tail<3>()};
@@ -319,7 +322,7 @@ CloneMotion Filter::motion_since(int index) {
   motion.T_1_2 = first.inverse() * now;
   // ξ_12 = ξ_2 - Ad(T_12^-1) ξ_1
   const Matrix6d Ad = adjoint(motion.T_1_2.inverse());
-  const int c = kBase + 6 * index;
+  const int c = clone_at(index);
   const int pose_rows[2] = {kPhi, kRho};
   Matrix6d P22;
   Matrix6d P21;

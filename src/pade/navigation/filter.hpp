@@ -15,11 +15,17 @@
 #include "pade/navigation/integrity/integrity.hpp"
 #include "pade/navigation/measurement.hpp"
 #include "pade/navigation/measurement_models.hpp"
+#include "pade/navigation/tight/raw_epoch.hpp"
+#include "pade/navigation/tight/raw_information.hpp"
+#include "pade/navigation/tight/raw_state.hpp"
 
 namespace pade::navigation {
 
 inline constexpr int kMaxClones = 10;
-inline constexpr int kMaxState = kBase + 6 * kMaxClones;
+inline constexpr int kMostCommon = kBase + kRawStates;  ///< errors without those of the clones
+/// Even, one more than there are: what Eigen may align it sums in pairs, and without raw GNSS the sums must
+/// be those of a filter that knows nothing of it, to the last bit.
+inline constexpr int kMaxState = kMostCommon + 1 + 6 * kMaxClones;
 
 /// Split of a reported GNSS position error into white noise and Gauss-Markov bias.
 struct GnssErrorClass {
@@ -56,11 +62,13 @@ struct FilterCore {
   int position_rejections = 0;  ///< in a row
   int velocity_rejections = 0;
   Integrity integrity;
+  RawState raw;  ///< of no account unless raw GNSS is expected
 };
 
 /// What is kept to come back to: everything but clones.
 struct FilterSnapshot : FilterCore {
-  BaseMatrix P = BaseMatrix::Zero();
+  /// Of the 22 errors, and the 9 of raw GNSS if it is expected.
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostCommon, kMostCommon> P = BaseMatrix::Zero();
 };
 
 /// Motion of the body between two clones or a clone and now.
@@ -104,6 +112,9 @@ class Filter {
   Innovation update(const ZeroVelocity& stop);
   Innovation update(const RangeToGround& range);
   Innovation update(const RoadMotion& road);
+  /// Every satellite for itself. Before watch(), position and velocity of the epoch instead, if it has them.
+  /// The innovation is that of the velocity from Doppler.
+  Innovation update(const RawEpoch& epoch);
   /// Levelling: the mean specific force of a body known to be unaccelerated.
   Innovation update_static_force(const Vector3d& force, double sigma);
 
@@ -124,7 +135,12 @@ class Filter {
   using FullMatrix =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxState, kMaxState>;
 
-  [[nodiscard]] int size() const { return kBase + 6 * clones_; }
+  using TallMatrix = Eigen::Matrix<double, Eigen::Dynamic, kRawVariables, 0, kMaxState, kRawVariables>;
+
+  /// Errors in front of those of the clones.
+  [[nodiscard]] int common() const { return options_.raw_gnss ? kMostCommon : kBase; }
+  [[nodiscard]] int size() const { return common() + 6 * clones_; }
+  [[nodiscard]] int clone_at(int index) const { return common() + 6 * index; }
   void flush();
   /// White part of the fix's covariance; follows the receiver from one error class to another.
   Matrix3d split_position_noise(const GnssFix& fix);
@@ -143,10 +159,27 @@ class Filter {
                      Eigen::Matrix<double, M, M> noise, double gate, bool force = false);
   void apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1>& error);
 
+  // Raw GNSS (tight/raw_update.cpp).
+  void flush_receiver(double T);
+  [[nodiscard]] RawVariables raw_variables() const;
+  /// Derivative of the antenna's position and velocity by the base errors.
+  [[nodiscard]] Eigen::Matrix<double, 6, kBase> antenna_rows() const;
+  [[nodiscard]] Innovation velocity_innovation(const GnssVelocity& velocity) const;
+  void set_prior(int index, double variance);
+  void start_receiver(const RawEpoch& epoch);
+  void follow_clock_jump(const RawEpoch& epoch);
+  void collect(const RawEpoch& epoch, RawEquations& equations) const;
+  [[nodiscard]] bool ranges_fit(RawEquations& equations);
+  [[nodiscard]] bool rates_fit(const RawEquations& equations);
+  void take(const RawInformation& information, const TallMatrix& C);
+  void follow_phases(const RawEpoch& epoch, const RawEquations& equations);
+  void set_anchor(const RawEpoch& epoch);
+  void judge_raw(const RawEpoch& epoch, const Innovation& innovation);
+
   FilterOptions options_;
   Vector3d lever_arm_ = Vector3d::Zero();
   FilterCore core_;
-  FullMatrix P_ = FullMatrix::Zero(kBase, kBase);  // base errors, then (φ, ρ) of each clone
+  FullMatrix P_ = FullMatrix::Zero(kBase, kBase);  // common errors, then (φ, ρ) of each clone
   std::array<Pose, kMaxClones> clone_poses_;
   int clones_ = 0;
 };

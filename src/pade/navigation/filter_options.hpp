@@ -55,6 +55,14 @@ struct FilterOptions {
   double iron_sigma = 0.03;  ///< field of the vehicle's iron per body axis, share of the Earth's field
   double iron_correlation_time = 600;  ///< s
 
+  // Raw GNSS (docs/navigation.md, section 7). A clock of temperature-compensated quartz.
+  bool raw_gnss = false;          ///< raw epochs are expected, in place of positions and velocities
+  double clock_noise = 0.1;       ///< of the clock, m/sqrt(s)
+  double clock_drift_walk = 0.2;  ///< of its drift, m/s/sqrt(s)
+  double raw_bias_sigma = 1;      ///< what all ranges together are wrong by for minutes, per axis, m
+  double raw_gate = 4;            ///< sigmas beyond which a measurement of a satellite is not used
+  double phase_anchor_time = 1;   ///< phases are counted from one epoch for so long, s
+
   // Robustness.
   double gate_probability_3 = 16.27;  ///< chi-square bound of 3 degrees of freedom (99.9 %)
   double gate_probability_2 = 13.82;  ///< of 2 degrees of freedom
@@ -96,6 +104,13 @@ struct FilterOptions {
     field("barometer_correlation_time", self.barometer_correlation_time, "of the barometer's zero, s");
     field("iron_sigma", self.iron_sigma, "field of the vehicle's iron, share of the Earth's field");
     field("iron_correlation_time", self.iron_correlation_time, "s");
+    field("raw_gnss", self.raw_gnss, "raw epochs are expected, in place of positions and velocities");
+    field("clock_noise", self.clock_noise, "of the receiver's clock, m/sqrt(s)");
+    field("clock_drift_walk", self.clock_drift_walk, "of its drift, m/s/sqrt(s)");
+    field("raw_bias_sigma", self.raw_bias_sigma,
+          "what all pseudoranges together are wrong by for minutes, per axis, m");
+    field("raw_gate", self.raw_gate, "sigmas beyond which a measurement of a satellite is not used");
+    field("phase_anchor_time", self.phase_anchor_time, "phases are counted from one epoch for so long, s");
     field("gate_probability_3", self.gate_probability_3, "chi-square gate, 3 degrees of freedom");
     field("gate_probability_2", self.gate_probability_2, "chi-square gate, 2 degrees of freedom");
     field("gate_probability_1", self.gate_probability_1, "chi-square gate, 1 degree of freedom");

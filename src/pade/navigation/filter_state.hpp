@@ -20,6 +20,17 @@ inline constexpr int kHeightBias = 18;
 inline constexpr int kIron = 19;
 inline constexpr int kBase = 22;
 
+// Behind them, if raw GNSS is expected (tight/raw_state.hpp): the receiver's clock and its drift, in metres
+// of GPS's time and m/s; what the signals of GLONASS, Galileo and BeiDou are late against GPS's, m; and a
+// copy of the antenna's position (ENU) and of the clock at the epoch from which the carriers' phases are
+// counted. All additive.
+inline constexpr int kClock = 22;
+inline constexpr int kDrift = 23;
+inline constexpr int kSystemBias = 24;
+inline constexpr int kAnchorPosition = 27;
+inline constexpr int kAnchorClock = 30;
+inline constexpr int kRawStates = 9;
+
 using BaseVector = Eigen::Matrix<double, kBase, 1>;
 using BaseMatrix = Eigen::Matrix<double, kBase, kBase>;
 

@@ -2,12 +2,31 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <utility>
 
 #include "pade/core/lie.hpp"
 #include "pade/core/sensors/measurements.hpp"
 #include "pade/core/time.hpp"
 
 namespace pade::navigation {
+
+/// An epoch of raw GNSS, prepared for the filter: tight/raw_epoch.hpp, which is not installed yet.
+struct RawEpoch;
+
+/// How many measurements of single satellites were used and refused.
+struct RawCounts {
+  std::uint64_t used = 0;     ///< by the filter
+  std::uint64_t refused = 0;  ///< that do not fit
+};
+
+/// What became of raw GNSS.
+struct RawTally {
+  RawCounts ranges;               ///< pseudoranges
+  RawCounts rates;                ///< from Doppler
+  RawCounts phases;               ///< changes of the carriers' phases
+  std::uint64_t clock_jumps = 0;  ///< of the receiver's clock, by whole milliseconds
+};
 
 /// What became of a measurement.
 enum class Verdict : std::uint8_t {
@@ -39,7 +58,8 @@ enum class SensorKind : std::uint8_t {
   magnetometer,
   zero_velocity,
   range,
-  road
+  road,
+  raw_gnss
 };
 
 /// A measurement of any kind.
@@ -50,6 +70,7 @@ struct Measurement {
   Matrix3d covariance = Matrix3d::Identity();   ///< GNSS only
   double sigma = 0;                             ///< the others
   double extra = 0;                             ///< ground height of a range
+  std::shared_ptr<const RawEpoch> raw;          ///< raw GNSS only, and then not null
   Innovation innovation;                        ///< of its last use by the live filter
 
   Measurement() = default;
@@ -69,6 +90,8 @@ struct Measurement {
   explicit Measurement(const RangeToGround& m)
       : time(m.time), kind(SensorKind::range), value(m.range, 0, 0), sigma(m.sigma), extra(m.ground_height) {}
   explicit Measurement(const RoadMotion& m) : time(m.time), kind(SensorKind::road), sigma(m.sigma) {}
+  Measurement(std::shared_ptr<const RawEpoch> epoch, Time stamp)
+      : time(stamp), kind(SensorKind::raw_gnss), raw(std::move(epoch)) {}
   /// @}
 };
 

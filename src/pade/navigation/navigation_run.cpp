@@ -56,6 +56,7 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
   std::sort(frames.begin(), frames.end());
   navigation::ReplayOptions replay;
   if (options.heading) replay.headings.push_back(*options.heading);
+  replay.raw = options.raw;
   if (options.on_road) replay.road_rate = 5;
 
   const auto offset = Time::from_seconds(options.navigator.camera_time_offset).nanoseconds;
@@ -77,6 +78,7 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
   });
   run.health.frames_without_answer += frames.size() - next;
   run.health.filter = navigator.health();
+  run.raw = navigator.raw_tally();
   run.health.sensors = navigation::summarise(run.measurements);
   count_frames(run);
   return run;

@@ -2,6 +2,7 @@
 // health; and the poses of a camera that follow from it.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,7 +19,9 @@ struct NavigationRunOptions {
   double rate = 10;                ///< Hz
   Pose T_body_camera;              ///< of the motions; the trajectory is the body's
   std::optional<Heading> heading;  ///< a yaw known at the start
-  bool on_road = false;            ///< a vehicle on wheels, which moves along its x axis only
+  std::vector<std::shared_ptr<const navigation::RawEpoch>>
+      raw;               ///< raw GNSS beside the log's own; none is null
+  bool on_road = false;  ///< a vehicle on wheels, which moves along its x axis only
 };
 
 /// The state at one frame.
@@ -40,6 +43,7 @@ struct NavigationRun {
   std::vector<FrameMotion> motions;                   ///< of neighbouring frames with an answer
   std::vector<navigation::Measurement> measurements;  ///< each with its last innovation
   NavigationHealth health;
+  navigation::RawTally raw;  ///< of raw GNSS
 };
 
 /// Plays the whole log in the order of its stamps. Every frame is answered causally, as in flight.

@@ -8,6 +8,7 @@
 
 #include "pade/core/option_check.hpp"
 #include "pade/navigation/alignment.hpp"
+#include "pade/navigation/tight/raw_epoch.hpp"
 #include "pade/navigation/timeline.hpp"
 
 namespace pade::navigation {
@@ -58,6 +59,9 @@ class Navigator::Core {
   AbsolutePose absolute_pose(Time t);
   Health health();
   [[nodiscard]] const NavigatorOptions& options() const { return options_; }
+  [[nodiscard]] RawTally raw_tally() const {
+    return phase_ == AlignmentPhase::aligned ? live_.core().raw.tally : RawTally{};
+  }
   [[nodiscard]] Time newest() const { return newest_; }
   void on_retired(std::function<void(const Measurement&)> sink) { sink_ = std::move(sink); }
   void retire(Time before);
@@ -357,11 +361,18 @@ void Navigator::add(const RoadMotion& measurement) {
   core_->add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
 }
 
+void Navigator::add(std::shared_ptr<const RawEpoch> measurement) {
+  if (!measurement) return;
+  const Time time = measurement->time;
+  core_->add(Measurement(std::move(measurement), time), core_->options().gnss_position_latency, true);
+}
+
 RelativePose Navigator::relative_pose(Time t1, Time t2, const Pose& T_body_camera) {
   return core_->relative_pose(t1, t2, T_body_camera);
 }
 AbsolutePose Navigator::absolute_pose(Time t) { return core_->absolute_pose(t); }
 Health Navigator::health() { return core_->health(); }
+RawTally Navigator::raw_tally() const { return core_->raw_tally(); }
 Time Navigator::newest() const { return core_->newest(); }
 void Navigator::on_retired(std::function<void(const Measurement&)> sink) {
   core_->on_retired(std::move(sink));

@@ -126,6 +126,9 @@ class Navigator {
   void add(const ZeroVelocity& measurement);
   void add(const RangeToGround& measurement);
   void add(const RoadMotion& measurement);
+  /// Raw GNSS, of which the options say that it is expected (FilterOptions::raw_gnss); else its position and
+  /// velocity are used. Null is passed over.
+  void add(std::shared_ptr<const RawEpoch> measurement);
   /// @}
 
   /// Motion of the camera from image time t1 to image time t2 (t2 >= t1), from a clone at t1 within a replay
@@ -136,6 +139,8 @@ class Navigator {
 
   /// As of the newest data.
   [[nodiscard]] Health health();
+  /// What became of raw GNSS, satellite by satellite, since the last start of the filter.
+  [[nodiscard]] RawTally raw_tally() const;
   [[nodiscard]] Time newest() const;  ///< of the IMU samples
   /// Called with each measurement when it leaves the history, with the innovation of its last use.
   void on_retired(std::function<void(const Measurement&)> sink);

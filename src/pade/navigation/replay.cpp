@@ -7,13 +7,19 @@
 namespace pade::navigation {
 namespace {
 
-enum class Kind : std::uint8_t { heading, velocity, fix, barometer, magnetometer, imu };
+enum class Kind : std::uint8_t { heading, velocity, fix, barometer, magnetometer, raw, imu };
 
 struct Arrival {
   Time time;
   Kind kind;
   std::size_t index;
 };
+
+template <class Item>
+Time time_of(const Item& item) {
+  return item.time;
+}
+Time time_of(const std::shared_ptr<const RawEpoch>& epoch) { return epoch->time; }
 
 }  // namespace
 
@@ -24,8 +30,9 @@ void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions&
   const auto schedule = [&](const auto& items, Kind kind, bool delayed) {
     for (std::size_t i = 0; i < items.size(); ++i) {
       const double delay = delayed ? random.uniform(options.gnss_delay_low, options.gnss_delay_high) : 0;
-      if (items[i].time < options.from || items[i].time > options.to) continue;
-      arrivals.push_back({Time{items[i].time.nanoseconds + Time::from_seconds(delay).nanoseconds}, kind, i});
+      const Time time = time_of(items[i]);
+      if (time < options.from || time > options.to) continue;
+      arrivals.push_back({Time{time.nanoseconds + Time::from_seconds(delay).nanoseconds}, kind, i});
     }
   };
   schedule(options.headings, Kind::heading, false);
@@ -33,6 +40,7 @@ void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions&
   schedule(log.gnss.fixes, Kind::fix, true);
   schedule(log.barometer, Kind::barometer, false);
   schedule(log.magnetometer, Kind::magnetometer, false);
+  schedule(options.raw, Kind::raw, true);
   // A log keeps the order in which its IMU was written, also where stamps go back; the Navigator judges that.
   const std::size_t aiding = arrivals.size();
   schedule(log.imu, Kind::imu, false);
@@ -59,6 +67,9 @@ void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions&
           break;
         case Kind::magnetometer:
           navigator.add(log.magnetometer[i]);
+          break;
+        case Kind::raw:
+          navigator.add(options.raw[i]);
           break;
         case Kind::imu:
           break;

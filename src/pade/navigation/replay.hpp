@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "pade/core/sensors/navigation_log.hpp"
 #include "pade/navigation/navigator.hpp"
+#include "pade/navigation/tight/raw_epoch.hpp"
 
 namespace pade::navigation {
 
@@ -17,7 +19,8 @@ struct ReplayOptions {
   double gnss_delay_high = 0;     ///< (so that messages overtake each other), s
   std::uint64_t seed = 1;         ///< of the delays
   std::vector<Heading> headings;  ///< further measurements
-  double road_rate = 0;           ///< RoadMotion so many times a second: a vehicle on wheels, Hz
+  std::vector<std::shared_ptr<const RawEpoch>> raw;  ///< raw GNSS, in any order; none is null
+  double road_rate = 0;  ///< RoadMotion so many times a second: a vehicle on wheels, Hz
 };
 
 /// Calls `after_imu(stamp)` behind each IMU sample. At one moment aiding data arrives before the IMU sample.

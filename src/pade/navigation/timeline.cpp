@@ -18,6 +18,8 @@ Innovation apply(Filter& filter, const Measurement& m, double declination) {
       return filter.update(ZeroVelocity{m.time, m.sigma});
     case SensorKind::road:
       return filter.update(RoadMotion{m.time, m.sigma});
+    case SensorKind::raw_gnss:
+      return filter.update(*m.raw);
     case SensorKind::range:
       return filter.update(RangeToGround{m.time, m.value.x(), m.sigma, m.extra});
   }

@@ -286,7 +286,8 @@ Status read_options(std::string_view text, std::string_view file, MapSequenceOpt
 
 Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options) {
   if (options.sequence.poses != poses_from_sensors) return io::Sequence::open(folder, options.sequence);
-  return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation));
+  return io::Sequence::open(folder, options.sequence,
+                            poses_from_imu_gnss(options.navigation, options.sequence.topics));
 }
 
 Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,

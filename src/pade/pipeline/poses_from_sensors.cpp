@@ -11,13 +11,17 @@ namespace pade {
 Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
                                                          const std::vector<Time>& frames,
                                                          const CameraMounting& mounting,
-                                                         const navigation::NavigatorOptions& options) {
-  const auto checked = read_checked_log(folder);
+                                                         const navigation::NavigatorOptions& options,
+                                                         const std::string& topics) {
+  io::NavigationLogOptions log_options;
+  log_options.topics = topics;
+  const auto checked = read_checked_log(folder, log_options);
   if (!checked) return checked.error();
   const NavigationLog* const log = &checked->log;
   if (log->gnss.velocities.empty() || log->gnss.fixes.empty()) {
-    return Error{fmt::format("{}: no GNSS positions and velocities found, expected them in gnss.csv",
-                             folder.string())};
+    return Error{
+        fmt::format("{}: no GNSS positions and velocities found, expected them in gnss.csv or the recording",
+                    folder.string())};
   }
   NavigationRunOptions run_options;
   run_options.navigator = options;
@@ -64,9 +68,9 @@ std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
   return notes;
 }
 
-io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) {
-  return [options](const std::filesystem::path& folder, const std::vector<Time>& images,
-                   const io::Calibration& calibration) -> Result<io::ComputedPoses> {
+io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options, const std::string& topics) {
+  return [options, topics](const std::filesystem::path& folder, const std::vector<Time>& images,
+                           const io::Calibration& calibration) -> Result<io::ComputedPoses> {
     if (!calibration.T_body_camera) {
       return Error{
           fmt::format("{}: field T_body_camera is missing in the calibration, expected it because the poses "
@@ -76,7 +80,7 @@ io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options) 
     }
     const CameraMounting mounting{*calibration.T_body_camera, calibration.time_offset_s,
                                   calibration.gnss_lever_arm};
-    const auto trajectory = camera_trajectory_from_imu_gnss(folder, images, mounting, options);
+    const auto trajectory = camera_trajectory_from_imu_gnss(folder, images, mounting, options, topics);
     if (!trajectory) return trajectory.error();
     io::ComputedPoses result;
     for (std::size_t i = 0; i < trajectory->times.size(); ++i) {

@@ -25,7 +25,8 @@ struct CameraMounting {
 Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
                                                          const std::vector<Time>& frames,
                                                          const CameraMounting& mounting,
-                                                         const navigation::NavigatorOptions& options = {});
+                                                         const navigation::NavigatorOptions& options = {},
+                                                         const std::string& topics = {});
 
 /// What a person should know of the trajectory: motions of doubtful length and direction, and frames left
 /// out.
@@ -36,6 +37,8 @@ inline constexpr const char* poses_from_sensors = "from-imu-gnss";
 
 /// The same as a source of poses for io::Sequence. Errors: those of the function above; no GNSS data; a
 /// calibration without T_body_camera.
-io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options);
+/// @param topics  of a recording (io::NavigationLogOptions::topics)
+io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options,
+                                   const std::string& topics = {});
 
 }  // namespace pade

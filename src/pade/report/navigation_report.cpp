@@ -188,6 +188,8 @@ std::string navigation_report(const std::string& title, const NavigationLog& log
   html += health_table(run) + path_plots(log, run) + baseline_plot(log, run);
   html += innovation_plot(run, navigation::SensorKind::gnss_velocity, "GNSS velocity", "m/s");
   html += innovation_plot(run, navigation::SensorKind::gnss_position, "GNSS position", "m");
+  html +=
+      innovation_plot(run, navigation::SensorKind::raw_gnss, "Velocity from the Doppler of raw GNSS", "m/s");
   return html + "</main></body></html>\n";
 }
 

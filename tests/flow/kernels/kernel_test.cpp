@@ -1,4 +1,6 @@
 #include <cstring>
+#include <map>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -11,10 +13,18 @@ using simd::InstructionSet;
 
 class FlowKernels : public ::testing::TestWithParam<InstructionSet> {};
 
+/// Run once for each instruction set: the scalar twins take seconds.
+const std::vector<testing::TwinResult>& twins_of(InstructionSet set) {
+  static std::map<InstructionSet, std::vector<testing::TwinResult>> known;
+  const auto found = known.find(set);
+  return found != known.end() ? found->second
+                              : known.emplace(set, testing::run_kernel_twins(set)).first->second;
+}
+
 TEST_P(FlowKernels, AgreeWithTheirScalarTwinsInWholeImagesAndInStrips) {
   if (!simd::available(GetParam(), simd::best()))
     GTEST_SKIP() << "this machine has no " << simd::name(GetParam());
-  for (const testing::TwinResult& twin : testing::run_kernel_twins(GetParam())) {
+  for (const testing::TwinResult& twin : twins_of(GetParam())) {
     EXPECT_LT(twin.largest_difference, 1e-4) << twin.kernel;
     EXPECT_TRUE(twin.strips_agree) << twin.kernel;
   }
@@ -23,8 +33,8 @@ TEST_P(FlowKernels, AgreeWithTheirScalarTwinsInWholeImagesAndInStrips) {
 TEST_P(FlowKernels, GiveTheSameBitsInEveryInstructionSet) {
   if (!simd::available(GetParam(), simd::best()))
     GTEST_SKIP() << "this machine has no " << simd::name(GetParam());
-  const auto expected = testing::run_kernel_twins(InstructionSet::baseline);
-  const auto found = testing::run_kernel_twins(GetParam());
+  const auto& expected = twins_of(InstructionSet::baseline);
+  const auto& found = twins_of(GetParam());
   ASSERT_EQ(found.size(), expected.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     ASSERT_EQ(found[i].values.size(), expected[i].values.size());

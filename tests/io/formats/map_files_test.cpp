@@ -7,11 +7,16 @@
 #include <random>
 #include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 
+#include "pade/mapping/tiles/voxel_code.hpp"
+
 #include "mapping/flown_map.hpp"
+#include "mapping/query/random_map.hpp"
 
 namespace pade::io {
 namespace {
@@ -96,6 +101,32 @@ TEST_P(MapFile, ReadsBackToTheSameSpaceAndTheSameBytes) {
   ASSERT_TRUE(map.ok()) << map.error().message;
   expect_same_space(flown(), *map->octree());
   EXPECT_EQ(io::bytes_of(encode_map(*map, format())), content);
+}
+
+/// What a live session saves meanwhile, from the picture that others may read.
+TEST_P(MapFile, OfAViewIsThatOfItsMap) {
+  std::vector<OccupancyMap> maps;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) maps.push_back(mapping::random_map(seed));
+  maps.push_back(std::move(OccupancyMap::create()).value());
+  const auto check = [&](const OccupancyMap& map) {
+    const auto view = mapping::MapView::of(map);
+    const std::string bytes = bytes_of(encode_map(*view, format()));
+    if (is_binary()) {
+      EXPECT_EQ(bytes, bytes_of(encode_map(map, format())));
+      return;
+    }
+    const auto back = decode_map(bytes, "map.ot");
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    map.for_each_leaf([&](const mapping::MapLeaf& leaf) {
+      const Vector3d centre =
+          mapping::cell_of(leaf.code, leaf.depth, map.options().voxel).centre.cast<double>();
+      const Vector3d place = centre - Vector3d::Constant(0.01);
+      ASSERT_EQ(back->at(place), map.at(place));
+      ASSERT_NEAR(back->probability(place), map.probability(place), 0.005);
+    });
+  };
+  check(flown());
+  for (const OccupancyMap& map : maps) check(map);
 }
 
 TEST_P(MapFile, OfAnEmptyMapReadsBackEmpty) {

@@ -36,6 +36,10 @@ struct FakeDevice {
   std::uint32_t format = V4L2_PIX_FMT_GREY;  ///< the only one that it has
   std::uint32_t width = kWidth;
   bool present = true, stalled = false, faulty = false, short_of_bytes = false, without_stamps = false;
+  bool without_bytes = false, with_garbage = false;  ///< MJPEG of a camera on a busy bus
+  bool broken = false;                               ///< errs for ever, until it is opened again
+  bool hung = false;                                 ///< gives nothing, until it is opened again
+  bool of_other_clock = false;
   std::vector<std::vector<std::uint8_t>> buffers;
   std::deque<std::uint32_t> queued;
   std::int64_t frames = 0;
@@ -55,11 +59,15 @@ struct FakeDevice {
       used = static_cast<std::uint32_t>(jpeg.size());
     }
     if (short_of_bytes) used /= 2;
+    if (without_bytes) used = 0;
+    if (with_garbage) std::fill_n(buffer.begin() + 2, used - 2, std::uint8_t{0xA5});
   }
   int dequeue(v4l2_buffer& buffer) {
     if (!present) return errno = ENODEV, -1;
+    if (broken) return errno = EIO, -1;
     std::uint64_t ticks = 0;
-    if (::read(number, &ticks, sizeof(ticks)) < 0 || stalled || queued.empty()) return errno = EAGAIN, -1;
+    if (::read(number, &ticks, sizeof(ticks)) < 0 || stalled || hung || queued.empty())
+      return errno = EAGAIN, -1;
     buffer.index = queued.front();
     queued.pop_front();
     ++frames;
@@ -69,7 +77,7 @@ struct FakeDevice {
     if (faulty) buffer.flags |= V4L2_BUF_FLAG_ERROR;
     timespec now{};
     ::clock_gettime(CLOCK_MONOTONIC, &now);
-    buffer.timestamp = {now.tv_sec, now.tv_nsec / 1000};
+    buffer.timestamp = {now.tv_sec + (of_other_clock ? 1'000'000 : 0), now.tv_nsec / 1000};
     return 0;
   }
   int control(unsigned long request, void* argument) {
@@ -126,6 +134,7 @@ extern "C" {
 int open(const char* path, int flags, ...) {
   if (std::strcmp(path, kName) == 0) {
     if (!device().present) return errno = ENOENT, -1;
+    device().broken = device().hung = false;
     device().number = ::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK);
     const itimerspec each{{0, 10'000'000}, {0, 10'000'000}};
     ::timerfd_settime(device().number, 0, &each, nullptr);
@@ -242,6 +251,44 @@ TEST_F(V4l2, AStallNeverHoldsUpAndFramesThatAreFaultyAreLeftOut) {
     device().*fault = false;
     EXPECT_TRUE(frame_within(**source, frame, 50));
   }
+}
+
+TEST_F(V4l2, ImagesThatCannotBeDecodedAreLeftOut) {
+  device().format = V4L2_PIX_FMT_MJPEG;
+  const auto source = opened();
+  ASSERT_TRUE(source);
+  LiveFrame frame;
+  ASSERT_TRUE(frame_within(**source, frame, 50));
+  for (bool FakeDevice::*const fault : {&FakeDevice::without_bytes, &FakeDevice::with_garbage}) {
+    device().*fault = true;
+    EXPECT_FALSE(frame_within(**source, frame, 5));
+    device().*fault = false;
+    EXPECT_TRUE(frame_within(**source, frame, 50));
+  }
+}
+
+TEST_F(V4l2, IsOpenedAgainWhereItErrsOrHangs) {
+  for (bool FakeDevice::*const fault : {&FakeDevice::broken, &FakeDevice::hung}) {
+    device() = FakeDevice();
+    const auto source = opened();
+    ASSERT_TRUE(source);
+    LiveFrame frame;
+    ASSERT_TRUE(frame_within(**source, frame, 50));
+    device().*fault = true;
+    const Time start = now_of_ours();
+    while (!frame_within(**source, frame, 1) && seconds_between(start, now_of_ours()) < 5) {
+    }
+    EXPECT_LT(seconds_between(start, now_of_ours()), 3);
+  }
+}
+
+TEST_F(V4l2, StampsOfAnotherClockAreRefusedByName) {
+  const auto source = opened();
+  ASSERT_TRUE(source);
+  device().of_other_clock = true;
+  LiveFrame frame;
+  EXPECT_FALSE(frame_within(**source, frame, 10));
+  EXPECT_THAT((*source)->remark(), HasSubstr("not of the monotonic clock"));
 }
 
 TEST_F(V4l2, IsOpenedAgainAfterItWasPulledOut) {

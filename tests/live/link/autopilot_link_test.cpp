@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <deque>
+#include <optional>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -60,8 +61,19 @@ class Bench {
       const std::int64_t ms = now_.nanoseconds / kMillisecond;
       const auto boot = static_cast<std::uint32_t>(ms - 1'000'000);
       if (heartbeat && ms % 1000 == 0) tell(mavlink::Heartbeat{2, 12, 0, 0, 4, 3});
-      if (poses && ms % 20 == 0) tell(mavlink::AttitudeQuaternion{boot, 1, 0, 0, 0, 0, 0, 0, {}});
-      if (poses && ms % 30 == 0) {
+      if (poses && ms % 20 == 0) {
+        const double half = 0.5e-3 * turn_rate * static_cast<double>(ms % 1'000'000);
+        tell(mavlink::AttitudeQuaternion{boot,
+                                         static_cast<float>(std::cos(half)),
+                                         0,
+                                         0,
+                                         static_cast<float>(std::sin(half)),
+                                         0,
+                                         0,
+                                         static_cast<float>(turn_rate),
+                                         {}});
+      }
+      if (poses && positions && ms % 30 == 0) {
         tell(mavlink::LocalPositionNed{boot, 0.002F * static_cast<float>(boot), 0, -5, 2, 0, 0});
       }
       if (questions && ms % 100 == 50) tell(mavlink::Timesync{0, 77'000 + ms});
@@ -70,11 +82,38 @@ class Bench {
     }
   }
   AutopilotLink& link() { return link_; }
+  void change_system(std::uint8_t system) { sender_.system = system; }
   [[nodiscard]] Time now() const { return now_; }
+  void hear() {
+    parser_.add(line_.from_us, [&](const mavlink::Frame& frame) {
+      ++packets;
+      systems.push_back(frame.system);
+      if (const auto m = mavlink::unpack<mavlink::Heartbeat>(frame))
+        heartbeats.push_back({now_, m->system_status});
+      if (const auto m = mavlink::unpack<mavlink::StatusText>(frame))
+        texts.emplace_back(now_, m->text.data());
+      if (const auto m = mavlink::unpack<mavlink::ObstacleDistance>(frame)) {
+        sectors.push_back(now_);
+        last_sectors = *m;
+      }
+      if (const auto m = mavlink::unpack<mavlink::CommandLong>(frame)) {
+        commands.push_back(*m);
+        tell(mavlink::CommandAck{m->command, ack});
+      }
+      const auto sync = mavlink::unpack<mavlink::Timesync>(frame);
+      if (sync && sync->tc1 == 0 && answers) {
+        tell(mavlink::Timesync{now_.nanoseconds - 1'000'000 * kMillisecond, sync->ts1});
+      }
+      if (sync && sync->tc1 != 0) answered.push_back(sync->ts1);
+    });
+    line_.from_us.clear();
+  }
 
   bool heartbeat = true, poses = true, questions = false, answers = true;
-  bool camera = true, mapper = true, depth = true;
+  bool camera = true, mapper = true, depth = true, positions = true;
   std::uint8_t ack = 0;
+  double turn_rate = 0;  ///< clockwise, rad/s
+  mavlink::ObstacleDistance last_sectors;
 
   /// What we sent, by time.
   struct Said {
@@ -95,27 +134,6 @@ class Bench {
     const mavlink::Packet packet = pack(message, sender_);
     line_.to_us.insert(line_.to_us.end(), packet.bytes.begin(),
                        packet.bytes.begin() + static_cast<std::ptrdiff_t>(packet.length));
-  }
-  void hear() {
-    parser_.add(line_.from_us, [&](const mavlink::Frame& frame) {
-      ++packets;
-      systems.push_back(frame.system);
-      if (const auto m = mavlink::unpack<mavlink::Heartbeat>(frame))
-        heartbeats.push_back({now_, m->system_status});
-      if (const auto m = mavlink::unpack<mavlink::StatusText>(frame))
-        texts.emplace_back(now_, m->text.data());
-      if (mavlink::unpack<mavlink::ObstacleDistance>(frame)) sectors.push_back(now_);
-      if (const auto m = mavlink::unpack<mavlink::CommandLong>(frame)) {
-        commands.push_back(*m);
-        tell(mavlink::CommandAck{m->command, ack});
-      }
-      const auto sync = mavlink::unpack<mavlink::Timesync>(frame);
-      if (sync && sync->tc1 == 0 && answers) {
-        tell(mavlink::Timesync{now_.nanoseconds - 1'000'000 * kMillisecond, sync->ts1});
-      }
-      if (sync && sync->tc1 != 0) answered.push_back(sync->ts1);
-    });
-    line_.from_us.clear();
   }
 
   Line line_;
@@ -221,13 +239,104 @@ TEST(AutopilotLink, NamesHoverWhereThereIsNoDepth) { expect_said(&Bench::depth, 
 TEST(AutopilotLink, SectorsAreSentOnceAndNeverOld) {
   Bench bench;
   bench.run(5);
-  bench.link().offer({}, {bench.now().nanoseconds - 100 * kMillisecond});
+  bench.link().offer(mavlink::ObstacleDistance{}, {bench.now().nanoseconds - 100 * kMillisecond});
   bench.run(1);
   EXPECT_EQ(bench.sectors.size(), 1U);
-  bench.link().offer({}, {bench.now().nanoseconds - 350 * kMillisecond});
+  bench.link().offer(mavlink::ObstacleDistance{}, {bench.now().nanoseconds - 350 * kMillisecond});
   bench.run(1);
   EXPECT_EQ(bench.sectors.size(), 1U);
   EXPECT_EQ(bench.link().report().sectors_stale, 1U);
+}
+
+/// A message is a tenth of a second old or two, in which a vehicle turns by several bins: receivers take it
+/// for now.
+TEST(AutopilotLink, SectorsAreTurnedToTheHeadingAtWhichTheyLeave) {
+  for (const double degrees : {0.0, 60.0, -100.0}) {
+    Bench bench;
+    bench.turn_rate = degrees * std::numbers::pi / 180;
+    bench.run(5);
+    mavlink::ObstacleDistance message;
+    message.increment = 5;
+    message.distances.fill(65535);
+    message.distances[3] = 250;
+    bench.link().offer(message, {bench.now().nanoseconds - 250 * kMillisecond});
+    bench.run(0.01);
+    ASSERT_EQ(bench.sectors.size(), 1U);
+    const auto found =
+        std::find(bench.last_sectors.distances.begin(), bench.last_sectors.distances.end(), 250);
+    const auto bin = found - bench.last_sectors.distances.begin();
+    // Clockwise by 15 degrees: what was 15 degrees to the right is ahead.
+    EXPECT_EQ(bin, (72 + 3 - std::lround(degrees * 0.25 / 5)) % 72) << degrees;
+  }
+}
+
+/// Receivers would take sectors that say nothing for a sign of health.
+TEST(AutopilotLink, SectorsThatSayNothingAreNotSentAndThatIsSaid) {
+  Bench bench;
+  bench.run(5);
+  bench.link().offer(std::nullopt, bench.now());
+  bench.run(1);
+  EXPECT_TRUE(bench.sectors.empty());
+  EXPECT_EQ(bench.link().report().missing, Missing::view);
+  EXPECT_THAT(bench.texts.back().second, HasSubstr("nothing is seen at this height"));
+}
+
+TEST(AutopilotLink, IsNotActiveWhileItsSectorsAreTooOldToBeSent) {
+  Bench bench;
+  bench.run(5);
+  for (int i = 0; i < 20; ++i) {
+    bench.link().offer(mavlink::ObstacleDistance{}, {bench.now().nanoseconds - 350 * kMillisecond});
+    bench.run(0.1);
+  }
+  EXPECT_EQ(bench.link().report().missing, Missing::late);
+  EXPECT_NE(bench.heartbeats.back().state, kActiveState);
+  EXPECT_THAT(bench.texts.back().second, HasSubstr("sectors are too old"));
+}
+
+TEST(AutopilotLink, AnInputThatComesAndGoesFloodsNobody) {
+  Bench bench;
+  bench.run(5);
+  bench.texts.clear();
+  bench.heartbeats.clear();
+  for (int i = 0; i < 20; ++i) {
+    bench.camera = i % 2 == 1;
+    bench.run(0.5);
+  }
+  EXPECT_LE(bench.texts.size(), 11U);
+  EXPECT_LE(bench.heartbeats.size(), 40U);
+  EXPECT_GE(bench.texts.size(), 5U);
+}
+
+TEST(AutopilotLink, NamesTheMessageThatThePosesLack) {
+  Bench bench;
+  bench.positions = false;
+  bench.run(5);
+  const LinkReport report = bench.link().report();
+  EXPECT_FALSE(report.poses_come);
+  EXPECT_GT(report.attitudes, 100U);
+  EXPECT_EQ(report.positions, 0U);
+  EXPECT_THAT(bench.texts.back().second, HasSubstr("no LOCAL_POSITION_NED"));
+  EXPECT_GE(bench.commands.size(), 4U) << "plenty of attitudes are no reason to stop asking for positions";
+}
+
+TEST(AutopilotLink, TakesAnotherAutopilotOnceTheFirstIsGone) {
+  Bench bench;
+  bench.run(3);
+  ASSERT_EQ(bench.link().report().autopilot->system, 7);
+  bench.change_system(9);
+  bench.run(3);
+  EXPECT_EQ(bench.link().report().autopilot->system, 7);  // of another vehicle, for all that we know
+  bench.run(4);
+  EXPECT_EQ(bench.link().report().autopilot->system, 9);
+}
+
+TEST(AutopilotLink, SaysThatItEnds) {
+  Bench bench;
+  bench.run(5);
+  bench.link().end();
+  bench.hear();
+  EXPECT_NE(bench.heartbeats.back().state, kActiveState);
+  EXPECT_THAT(bench.texts.back().second, HasSubstr("has ended"));
 }
 
 TEST(AutopilotLink, WithoutAnswersAboutTheClockThereIsNoPose) {

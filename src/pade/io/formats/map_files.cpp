@@ -233,21 +233,39 @@ class NodeBytes {
   std::size_t nodes_ = 0;
 };
 
-}  // namespace
-
-ByteSource encode_map(const mapping::OccupancyMap& map, MapFormat format) {
-  // Written here, without an octree of OctoMap's, whose header is in the locale of the stream and gives res
-  // with six digits.
-  return [&map, format](const ByteSink& sink) {
+/// Written here, without an octree of OctoMap's, whose header is in the locale of the stream and gives res
+/// with six digits.
+template <class Map>
+ByteSource encoded(const Map& map, double voxel, MapFormat format) {
+  return [&map, voxel, format](const ByteSink& sink) {
     NodeBytes nodes(format);
     map.for_each_leaf([&nodes](const mapping::MapLeaf& leaf) { nodes.add(leaf); });
     nodes.finish();
     sink(fmt::format(
         "{}\n# (feel free to add / change comments, but leave the first line as it is!)\n#\nid OcTree\n"
         "size {}\nres {}\ndata\n",
-        format == MapFormat::bt ? kMagicBinary : kMagicFull, nodes.nodes(), map.options().voxel));
+        format == MapFormat::bt ? kMagicBinary : kMagicFull, nodes.nodes(), voxel));
     sink(nodes.bytes());
   };
+}
+
+template <class Map>
+Status write_any(const Map& map, const std::filesystem::path& path, Overwrite overwrite) {
+  const std::string extension = path.extension().string();
+  if (extension != ".bt" && extension != ".ot") {
+    return Error{fmt::format("{}: the name of a map file must end in .bt or .ot", path.string())};
+  }
+  return write_file(path, encode_map(map, extension == ".bt" ? MapFormat::bt : MapFormat::ot), overwrite);
+}
+
+}  // namespace
+
+ByteSource encode_map(const mapping::OccupancyMap& map, MapFormat format) {
+  return encoded(map, map.options().voxel, format);
+}
+
+ByteSource encode_map(const mapping::MapView& view, MapFormat format) {
+  return encoded(view, view.voxel(), format);
 }
 
 Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_view file,
@@ -272,11 +290,11 @@ Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_v
 }
 
 Status write_map(const mapping::OccupancyMap& map, const std::filesystem::path& path, Overwrite overwrite) {
-  const std::string extension = path.extension().string();
-  if (extension != ".bt" && extension != ".ot") {
-    return Error{fmt::format("{}: the name of a map file must end in .bt or .ot", path.string())};
-  }
-  return write_file(path, encode_map(map, extension == ".bt" ? MapFormat::bt : MapFormat::ot), overwrite);
+  return write_any(map, path, overwrite);
+}
+
+Status write_map(const mapping::MapView& view, const std::filesystem::path& path, Overwrite overwrite) {
+  return write_any(view, path, overwrite);
 }
 
 Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path,

@@ -11,6 +11,7 @@
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/world.hpp"
 #include "pade/mapping/occupancy_map.hpp"
+#include "pade/mapping/query/map_view.hpp"
 
 namespace pade::io {
 
@@ -22,6 +23,9 @@ enum class MapFormat {
 
 /// The content of a map file. Same map, same bytes. The map must outlive what is returned.
 ByteSource encode_map(const mapping::OccupancyMap& map, MapFormat format);
+/// The same of a view, which another thread may take while the map goes on: as .bt the bytes of the whole
+/// map, as .ot log-odds to 0.5 % of their range.
+ByteSource encode_map(const mapping::MapView& view, MapFormat format);
 
 /// Reads the content of a map file of either format; `file` is the name in messages. The whole structure is
 /// checked before anything is built: a file that was cut short or is no octree gives an error, never a part
@@ -32,6 +36,9 @@ Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_v
 /// Writes `path`, which must end in .bt or .ot, whole or not at all; every byte is checked (a full disk is an
 /// error).
 Status write_map(const mapping::OccupancyMap& map, const std::filesystem::path& path, Overwrite overwrite);
+
+/// Writes a view in the same way.
+Status write_map(const mapping::MapView& view, const std::filesystem::path& path, Overwrite overwrite);
 
 /// Reads a .bt or .ot file.
 Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path,

@@ -9,6 +9,7 @@
 
 #include "pade/io/foreign_file.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
+#include "pade/io/recording/recording.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/io/text.hpp"
 
@@ -62,6 +63,7 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   namespace fs = std::filesystem;
   NavigationLog log;
   std::error_code failure;
+  if (is_recording(folder)) return read_recording_sensors(folder, options.topics);
   if (fs::is_regular_file(folder, failure)) {
     return Error{fmt::format("{}: is a file, expected a folder with imu.csv and gnss.csv{}", folder.string(),
                              advice_for(folder))};

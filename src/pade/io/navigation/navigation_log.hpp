@@ -57,13 +57,20 @@ Result<std::vector<Time>> parse_stamps(std::string_view text, std::string_view n
 struct NavigationLogOptions {
   std::string gnss;  ///< file name of the GNSS log in the folder; empty: gnss.csv, or the only gnss*.csv
   GnssDefaults gnss_defaults;
+  std::string topics;  ///< of a recording, where several fit: names, separated by blanks
 };
 
 /// Reads a log folder: our layout or a recording (imu.csv, gnss*.csv, baro.csv, mag.csv, truth.csv or
-/// body_truth.txt), EuRoC (mav0/imu0/data.csv ...), or VectorNav (*-imu.csv, *-gnss.csv). Errors: no IMU
-/// file, several GNSS files and none chosen, or a file unusable as a whole.
+/// body_truth.txt), EuRoC (mav0/imu0/data.csv ...), or VectorNav (*-imu.csv, *-gnss.csv); or a recording of
+/// ROS (read_recording_sensors). Errors: no IMU file, several GNSS files and none chosen, or a file unusable
+/// as a whole.
 Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
                                           const NavigationLogOptions& options = {});
+
+/// The sensors of a recording of ROS (recording/recording.hpp): Imu, NavSatFix, the receiver's TwistStamped
+/// (east, north, up), MagneticField, FluidPressure. The IMU's frame is the body. Errors: those of
+/// Recording::open; the IMU or the GNSS is missing; several topics fit and none is named in `topics`.
+Result<NavigationLog> read_recording_sensors(const std::filesystem::path& file, std::string_view topics);
 
 /// Our own layout as text, stamps with nine digits where needed; what parse_imu and parse_gnss read back.
 std::string format_imu(const std::vector<ImuSample>& samples);

@@ -52,11 +52,12 @@ cv::Mat shrunk(const cv::Mat& valid, int radius) {
 
 }  // namespace
 
-cv::Mat black_in_every_image(const std::vector<std::filesystem::path>& files, cv::Size size) {
+cv::Mat black_in_every_image(const std::vector<std::filesystem::path>& files, const ImageStore& store,
+                             cv::Size size) {
   cv::Mat black(size, CV_8UC1, cv::Scalar(255));
   bool any = false;
   for (const auto& file : files) {
-    const auto image = read_image(file);
+    const auto image = store.read(file);
     if (!image || image->size() != size) continue;
     any = true;
     cv::bitwise_and(black, is_black(*image), black);

@@ -14,6 +14,8 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/crc32.hpp"
+
 namespace pade::io {
 namespace {
 
@@ -29,7 +31,7 @@ std::uint32_t big_endian(const std::uint8_t* bytes, int count) {
   return value;
 }
 
-/// A file of which only parts are read.
+/// A file, or its bytes, of which only parts are read.
 class ImageFile {
  public:
   static Result<ImageFile> open(const std::filesystem::path& file) {
@@ -46,11 +48,23 @@ class ImageFile {
     return image;
   }
 
+  static Result<ImageFile> of(std::string_view bytes) {
+    if (bytes.empty()) return Error{"the image is empty (0 bytes)"};
+    ImageFile image;
+    image.memory_ = bytes;
+    image.size_ = bytes.size();
+    return image;
+  }
+
   [[nodiscard]] std::size_t size() const { return size_; }
 
   /// Up to `count` bytes from `offset`; fewer where the file ends.
   Bytes read(std::size_t offset, std::size_t count) {
     Bytes bytes(offset < size_ ? std::min(count, size_ - offset) : 0);
+    if (!memory_.empty()) {
+      if (!bytes.empty()) std::memcpy(bytes.data(), memory_.data() + offset, bytes.size());
+      return bytes;
+    }
     stream_.clear();
     stream_.seekg(static_cast<std::streamoff>(offset));
     stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -60,6 +74,7 @@ class ImageFile {
 
  private:
   std::ifstream stream_;
+  std::string_view memory_;  // instead of the stream
   std::size_t size_ = 0;
 };
 
@@ -165,24 +180,6 @@ Result<ImageInfo> inspect_pnm(ImageFile& file) {
   return info;
 }
 
-constexpr std::array<std::uint32_t, 256> crc_table() {
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t i = 0; i < table.size(); ++i) {
-    std::uint32_t c = i;
-    for (int bit = 0; bit < 8; ++bit) c = (c & 1U) != 0 ? 0xEDB88320U ^ (c >> 1) : c >> 1;
-    table[i] = c;
-  }
-  return table;
-}
-
-/// The checksum of PNG (ISO 3309) over `count` bytes.
-std::uint32_t crc32(const std::uint8_t* bytes, std::size_t count) {
-  static constexpr auto kTable = crc_table();
-  std::uint32_t c = 0xFFFFFFFFU;
-  for (std::size_t i = 0; i < count; ++i) c = kTable[(c ^ bytes[i]) & 0xFFU] ^ (c >> 8);
-  return c ^ 0xFFFFFFFFU;
-}
-
 /// Empty where every chunk is whole. libpng finds the same, but prints to the terminal and carries on.
 std::optional<Error> png_defect(const Bytes& bytes) {
   std::size_t at = kPngSignature.size();
@@ -233,30 +230,42 @@ Result<ImageInfo> inspect(ImageFile& file) {
 }
 
 template <class T>
-Result<T> named(const std::filesystem::path& file, Result<T> result) {
+Result<T> named(const std::string& file, Result<T> result) {
   if (result) return result;
-  return Error{fmt::format("{}: {}", file.string(), result.error().message)};
+  return Error{fmt::format("{}: {}", file, result.error().message)};
+}
+
+Result<cv::Mat> read_whole(ImageFile& file) {
+  const Bytes bytes = file.read(0, file.size());
+  if (is_png(bytes)) {
+    if (const auto defect = png_defect(bytes)) return *defect;
+  } else if (is_jpeg(bytes) || is_binary_pnm(bytes)) {
+    const auto info = inspect(file);
+    if (!info) return info.error();
+  }
+  return decode(bytes);
 }
 
 }  // namespace
 
 Result<ImageInfo> inspect_image(const std::filesystem::path& path) {
   auto file = ImageFile::open(path);
-  if (!file) return named<ImageInfo>(path, file.error());
-  return named(path, inspect(*file));
+  return named(path.string(), file ? inspect(*file) : file.error());
 }
 
 Result<cv::Mat> read_image(const std::filesystem::path& path) {
   auto file = ImageFile::open(path);
-  if (!file) return named<cv::Mat>(path, file.error());
-  const Bytes bytes = file->read(0, file->size());
-  if (is_png(bytes)) {
-    if (const auto defect = png_defect(bytes)) return named<cv::Mat>(path, *defect);
-  } else if (is_jpeg(bytes) || is_binary_pnm(bytes)) {
-    const auto info = inspect(*file);
-    if (!info) return named<cv::Mat>(path, info.error());
-  }
-  return named(path, decode(bytes));
+  return named(path.string(), file ? read_whole(*file) : file.error());
+}
+
+Result<ImageInfo> inspect_image_bytes(std::string_view bytes, const std::string& name) {
+  auto file = ImageFile::of(bytes);
+  return named(name, file ? inspect(*file) : file.error());
+}
+
+Result<cv::Mat> read_image_bytes(std::string_view bytes, const std::string& name) {
+  auto file = ImageFile::of(bytes);
+  return named(name, file ? read_whole(*file) : file.error());
 }
 
 }  // namespace pade::io

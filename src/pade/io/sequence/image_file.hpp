@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <string_view>
 
 #include <opencv2/core.hpp>
 
@@ -25,5 +27,11 @@ Result<ImageInfo> inspect_image(const std::filesystem::path& path);
 /// ignored (a calibration belongs to the sensor's pixels). Error if the file is missing, empty, cut short
 /// or corrupt: the checksums of PNG are verified.
 Result<cv::Mat> read_image(const std::filesystem::path& path);
+
+/// @{
+/// The same of the bytes of such a file; `name` stands in messages.
+Result<ImageInfo> inspect_image_bytes(std::string_view bytes, const std::string& name);
+Result<cv::Mat> read_image_bytes(std::string_view bytes, const std::string& name);
+/// @}
 
 }  // namespace pade::io

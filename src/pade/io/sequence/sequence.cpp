@@ -41,8 +41,8 @@ struct Candidate {
 std::string size_text(cv::Size size) { return fmt::format("{} x {}", size.width, size.height); }
 
 /// Images in order of time with files that look whole; the others go to the report.
-std::vector<Candidate> whole_images(std::vector<StampedFile> images, const fs::path& folder,
-                                    ReadReport& report) {
+std::vector<Candidate> whole_images(std::vector<StampedFile> images, const ImageStore& store,
+                                    const fs::path& folder, ReadReport& report) {
   const auto earlier = [](const StampedFile& a, const StampedFile& b) { return a.time < b.time; };
   if (!std::is_sorted(images.begin(), images.end(), earlier)) {
     std::stable_sort(images.begin(), images.end(), earlier);
@@ -55,7 +55,7 @@ std::vector<Candidate> whole_images(std::vector<StampedFile> images, const fs::p
       report.skip(images[i].file.string(), fmt::format("time {} was seen before", to_string(images[i].time)));
       continue;
     }
-    const auto info = inspect_image(images[i].file);
+    const auto info = store.inspect(images[i].file);
     if (info) {
       whole.push_back({images[i], *info});
     } else {
@@ -155,7 +155,7 @@ std::vector<fs::path> spread(const std::vector<FrameEntry>& frames, std::size_t 
   return files;
 }
 
-IntensityScaling choose_intensity(int bits, const std::vector<FrameEntry>& frames,
+IntensityScaling choose_intensity(int bits, const std::vector<FrameEntry>& frames, const ImageStore& store,
                                   const Calibration& calibration) {
   if (bits == 8) return {};
   if (calibration.intensity) {
@@ -165,7 +165,7 @@ IntensityScaling choose_intensity(int bits, const std::vector<FrameEntry>& frame
   constexpr std::size_t kSamples = 8;
   std::vector<cv::Mat> samples;
   for (const fs::path& file : spread(frames, kSamples)) {
-    auto image = read_image(file);
+    auto image = store.read(file);
     if (image && image->depth() == CV_16U) samples.push_back(std::move(*image));
   }
   return intensity_from_percentiles(samples);
@@ -293,7 +293,7 @@ Status Sequence::Data::choose_frames(const PoseSource& source) {
                     folder.string())};
   }
   raw_camera = *calibration.camera;
-  const std::vector<Candidate> images = whole_images(listing.images, folder, report);
+  const std::vector<Candidate> images = whole_images(listing.images, *listing.store, folder, report);
   const ImageInfo kind = most_frequent(images);
   if (raw_camera.width == 0 || raw_camera.height == 0) {
     raw_camera.width = kind.size.width;
@@ -308,7 +308,7 @@ Status Sequence::Data::choose_frames(const PoseSource& source) {
   frames = usable_frames(images, listing, raw_camera, kind.bits, options.largest_pose_gap, report);
   if (auto enough = enough_usable(frames.size(), listing.images.size(), report, folder); !enough)
     return enough;
-  intensity = choose_intensity(kind.bits, frames, calibration);
+  intensity = choose_intensity(kind.bits, frames, *listing.store, calibration);
   camera = raw_camera.undistorted();
   undistorter = Undistorter(raw_camera);
   return {};
@@ -316,13 +316,15 @@ Status Sequence::Data::choose_frames(const PoseSource& source) {
 
 Status Sequence::Data::make_mask() {
   const fs::path file = folder / "mask.png";
-  if (path_exists(file)) {
+  if (!listing.mask.empty() && listing.mask.size() == raw_camera.size()) {
+    mask = listing.mask;
+  } else if (path_exists(file)) {
     const auto recorded = read_mask(file, raw_camera.size());
     if (!recorded) return recorded.error();
     mask = undistorted_mask(*recorded, false, raw_camera, undistorter, options.mask_growth);
   } else {
     constexpr std::size_t kSamples = 128;  // all frames of a short sequence
-    const cv::Mat black = black_in_every_image(spread(frames, kSamples), raw_camera.size());
+    const cv::Mat black = black_in_every_image(spread(frames, kSamples), *listing.store, raw_camera.size());
     mask = undistorted_mask(cv::Mat(~black), true, raw_camera, undistorter, options.mask_growth);
   }
   if (cv::countNonZero(mask) == 0) {
@@ -382,8 +384,9 @@ Result<Sequence> Sequence::open(const fs::path& folder, const SequenceOptions& o
   auto data = std::make_unique<Data>();
   data->folder = folder;
   data->options = options;
-  auto listing = read_layout(folder, {options.poses, options.calibration, source != nullptr, options.camera},
-                             data->report);
+  auto listing = read_layout(
+      folder, {options.poses, options.calibration, source != nullptr, options.camera, options.topics},
+      data->report);
   if (!listing) return listing.error();
   if (source) listing->pose_file = options.poses;
   data->listing = std::move(*listing);
@@ -415,7 +418,7 @@ Status Sequence::check(std::size_t undecodable) const {
 
 Result<Frame> Sequence::frame(std::size_t i) const {
   const FrameEntry& entry = data_->frames[i];
-  const auto image = read_image(entry.image);
+  const auto image = data_->listing.store->read(entry.image);
   if (!image) return image.error();
   const int depth = data_->intensity.bits == 16 ? CV_16U : CV_8U;
   if (image->size() != data_->raw_camera.size() || image->depth() != depth) {
@@ -425,6 +428,10 @@ Result<Frame> Sequence::frame(std::size_t i) const {
   }
   return Frame{entry.time, data_->undistorter(data_->intensity(*image)), entry.T_world_camera,
                entry.motion_covariance};
+}
+
+Result<EncodedImage> Sequence::encoded_image(std::size_t i) const {
+  return data_->listing.store->encoded(data_->frames[i].image);
 }
 
 bool Sequence::has_truth() const {
@@ -474,6 +481,9 @@ const std::optional<GeographicOrigin>& Sequence::origin() const { return data_->
 const Eigen::Vector3d& Sequence::local_origin() const { return data_->local_origin; }
 const Calibration& Sequence::calibration() const { return data_->listing.calibration; }
 const Trajectory& Sequence::trajectory() const { return data_->listing.trajectory; }
+bool Sequence::poses_of_body() const { return data_->listing.poses_of_body; }
+bool Sequence::poses_computed() const { return data_->listing.computed; }
+bool Sequence::mask_is_stated() const { return path_exists(data_->folder / "mask.png"); }
 std::size_t Sequence::listed_frames() const { return data_->listing.images.size(); }
 std::size_t Sequence::frames_without_pose() const { return data_->listing.frames_without_pose; }
 std::size_t Sequence::motions_without_scale() const { return data_->listing.motions_without_scale; }

@@ -18,6 +18,7 @@
 #include "pade/core/health.hpp"
 #include "pade/core/result.hpp"
 #include "pade/io/sequence/calibration.hpp"
+#include "pade/io/sequence/image_store.hpp"
 #include "pade/io/sequence/intensity.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/io/skipped.hpp"
@@ -30,6 +31,7 @@ struct SequenceOptions {
   std::string calibration;
   std::string world_up;
   std::string origin = "auto";
+  std::string topics;
   int camera = 0;
   double largest_pose_gap = 0.5;
   double largest_truth_gap = 0.02;
@@ -46,6 +48,8 @@ struct SequenceOptions {
     field("origin", self.origin,
           "point of the pose world that becomes 0 0 0 of the run: auto (a point near the flight if that is "
           "farther than 1 km from 0 0 0), flight (always a point near the flight), none, or \"x y z\"");
+    field("topics", self.topics,
+          "topics of a recording that are meant where several fit: names, separated by blanks");
     field("camera", self.camera, "which camera of a calibration file that holds several, from 0");
     field("largest_pose_gap", self.largest_pose_gap,
           "poses are interpolated between rows at most this far apart, s");
@@ -91,7 +95,10 @@ class Sequence {
   /// decoded is still counted here: see frame() and check().
   [[nodiscard]] std::size_t size() const;
   [[nodiscard]] Time time(std::size_t i) const;
+  /// Of a recording, a name for messages: the file, the topic and the time.
   [[nodiscard]] const std::filesystem::path& image_file(std::size_t i) const;
+  /// Image i as it is kept, still with the lens's distortion. Error if it cannot be read.
+  [[nodiscard]] Result<EncodedImage> encoded_image(std::size_t i) const;
   /// Pose of the camera of frame i: interpolated at image time + time_offset_s, T_body_camera applied,
   /// local_origin() subtracted.
   [[nodiscard]] const Pose& pose(std::size_t i) const;
@@ -118,8 +125,8 @@ class Sequence {
   [[nodiscard]] const cv::Mat& mask() const;
 
   [[nodiscard]] const std::filesystem::path& folder() const;
-  [[nodiscard]] const std::string& layout()
-      const;  ///< "TUM RGB-D", "EuRoC", "KITTI odometry", "TartanAir" or "ICL-NUIM"
+  [[nodiscard]] const std::string& layout() const;  ///< "TUM RGB-D", "EuRoC", "KITTI odometry", "TartanAir",
+                                                    ///< "ICL-NUIM", "rosbag 2.0", "MCAP" or "rosbag2"
   [[nodiscard]] const std::filesystem::path& pose_file() const;
   [[nodiscard]] const SequenceOptions& options() const;
   [[nodiscard]] const IntensityScaling& intensity() const;
@@ -136,6 +143,10 @@ class Sequence {
   [[nodiscard]] const Calibration& calibration() const;
   /// The pose file as read (of the body where calibration says so).
   [[nodiscard]] const Trajectory& trajectory() const;
+
+  [[nodiscard]] bool poses_of_body() const;   ///< trajectory() is the body's
+  [[nodiscard]] bool poses_computed() const;  ///< trajectory() is the camera's, at the times of the images
+  [[nodiscard]] bool mask_is_stated() const;  ///< by a mask.png
 
   [[nodiscard]] std::size_t listed_frames() const;          ///< in the folder, usable or not
   [[nodiscard]] std::size_t frames_without_pose() const;    ///< skipped because no pose is near in time

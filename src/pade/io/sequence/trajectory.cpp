@@ -77,7 +77,11 @@ Trajectory Trajectory::transformed(const Pose& left, const Pose& right) const {
 void TrajectoryBuilder::add(std::size_t line, Time time, const Eigen::Vector3d& translation,
                             const Eigen::Vector4d& xyzw) {
   if (const std::string why = defect(translation, xyzw); !why.empty()) return skip(line, why);
-  rows_.push_back({line, {time, {Eigen::Quaterniond(xyzw).normalized(), translation}}});
+  // One that is of unit length but for rounding stays as it is, so that what is written is read back.
+  constexpr double kRounding = 1e-15;
+  Eigen::Quaterniond rotation(xyzw);
+  if (std::abs(xyzw.squaredNorm() - 1) > kRounding) rotation.normalize();
+  rows_.push_back({line, {time, {rotation, translation}}});
 }
 
 void TrajectoryBuilder::skip(std::size_t line, const std::string& reason) { bad_.emplace_back(line, reason); }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -19,6 +20,8 @@
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <unistd.h>
+
+#include "pade/live/camera/folder_source.hpp"
 
 namespace pade::live {
 namespace {
@@ -63,6 +66,9 @@ class Device {
     pollfd asked{number_, POLLIN, 0};
     const int ready = ::poll(&asked, 1, milliseconds);
     if (ready <= 0) return false;
+    if ((asked.revents & POLLIN) == 0) {  // an error that lasts: poll() would come back at once, for ever
+      ::poll(nullptr, 0, milliseconds);
+    }
     v4l2_buffer buffer{};
     buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     buffer.memory = V4L2_MEMORY_MMAP;
@@ -74,6 +80,9 @@ class Device {
     lost = ask(number_, VIDIOC_QBUF, &buffer) < 0;
     return good;
   }
+
+  /// The stamp of the last frame was not of the monotonic clock.
+  [[nodiscard]] bool has_other_clock() const { return other_clock_; }
 
  private:
   Device() = default;
@@ -91,7 +100,10 @@ class Device {
       format.fmt.pix.height = static_cast<std::uint32_t>(camera.height);
       format.fmt.pix.pixelformat = wanted;
       format.fmt.pix.field = V4L2_FIELD_NONE;
-      if (ask(number_, VIDIOC_S_FMT, &format) < 0) continue;
+      if (ask(number_, VIDIOC_S_FMT, &format) < 0) {
+        if (errno == EBUSY) return Error{fmt::format("{}: is in use by another program", name)};
+        continue;
+      }
       format_ = format.fmt.pix;
       if (format_.pixelformat != wanted) continue;
       const bool size = format_.width == static_cast<std::uint32_t>(camera.width) &&
@@ -138,20 +150,33 @@ class Device {
     return {};
   }
 
-  [[nodiscard]] bool take(const v4l2_buffer& buffer, LiveFrame& frame) const {
+  [[nodiscard]] static cv::Mat decoded(void* start, std::size_t bytes) {
+    constexpr std::size_t kShortest = 8;  // fewer hold no header; cameras on a busy bus give none at all
+    if (bytes < kShortest) return {};
+    try {  // OpenCV throws on sizes it refuses and on allocation
+      return cv::imdecode(cv::Mat(1, static_cast<int>(bytes), CV_8UC1, start), cv::IMREAD_COLOR);
+    } catch (const std::exception&) {
+      return {};
+    }
+  }
+
+  [[nodiscard]] bool take(const v4l2_buffer& buffer, LiveFrame& frame) {
     const bool monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
     if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || !monotonic || buffer.index >= buffers_.size())
       return false;
     frame.time = {static_cast<std::int64_t>(buffer.timestamp.tv_sec) * 1'000'000'000 +
                   static_cast<std::int64_t>(buffer.timestamp.tv_usec) * 1000};
     if (frame.time.nanoseconds == 0) return false;
+    constexpr double kFarthest = 1;  // s
+    other_clock_ = std::abs(seconds_between(frame.time, now_of_ours())) > kFarthest;
+    if (other_clock_) return false;
     const int width = static_cast<int>(format_.width);
     const int height = static_cast<int>(format_.height);
     const std::size_t bytes = buffer.bytesused;
     void* const start = buffers_[buffer.index].first;
     if (bytes > buffers_[buffer.index].second) return false;
     if (format_.pixelformat == V4L2_PIX_FMT_MJPEG) {
-      frame.image = cv::imdecode(cv::Mat(1, static_cast<int>(bytes), CV_8UC1, start), cv::IMREAD_COLOR);
+      frame.image = decoded(start, bytes);
       return frame.image.cols == width && frame.image.rows == height;
     }
     const bool grey = format_.pixelformat == V4L2_PIX_FMT_GREY;
@@ -167,6 +192,7 @@ class Device {
   }
 
   int number_ = -1;
+  bool other_clock_ = false;
   v4l2_pix_format format_{};
   std::vector<std::pair<void*, std::size_t>> buffers_;
 };
@@ -185,13 +211,25 @@ class V4l2Source : public FrameSource {
     if (!device_ && !reopen(milliseconds)) return Outcome::nothing;
     bool lost = false;
     const bool come = device_->next(frame, milliseconds, lost);
-    if (lost) device_.reset();
+    const auto now = std::chrono::steady_clock::now();
+    if (come) come_ = now;
+    other_clock_ = device_->has_other_clock();
+    // Cameras on USB that hang come back when they are opened again.
+    constexpr auto kPatience = std::chrono::seconds(1);
+    const bool hangs = now - std::max(come_, tried_) > kPatience && !other_clock_;
+    if (lost || hangs) {
+      device_.reset();
+    }
     if (!come) return Outcome::nothing;
     frame.image = undistort_(frame.image);
     return Outcome::frame;
   }
   [[nodiscard]] const Camera& camera() const override { return ideal_; }
   [[nodiscard]] cv::Mat mask() const override { return undistort_.valid(); }
+  [[nodiscard]] std::string remark() const override {
+    if (other_clock_) return "its stamps are not of the monotonic clock";
+    return device_ ? std::string() : std::string("it cannot be opened");
+  }
 
  private:
   bool reopen(int milliseconds) {
@@ -213,7 +251,9 @@ class V4l2Source : public FrameSource {
   double rate_;
   Camera ideal_;
   Undistorter undistort_;
-  std::chrono::steady_clock::time_point tried_;
+  bool other_clock_ = false;
+  std::chrono::steady_clock::time_point tried_ = std::chrono::steady_clock::now();  // to open it, last
+  std::chrono::steady_clock::time_point come_ = tried_;                             // the last frame
 };
 
 }  // namespace

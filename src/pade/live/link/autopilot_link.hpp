@@ -47,13 +47,20 @@ struct LinkReport {
   bool synchronised = false;           ///< with its clock
   double clock_bound = 0;              ///< of the clock's error, s
   std::size_t clock_restarts = 0;
-  std::size_t pose_messages = 0;
+  std::size_t attitudes = 0;
+  std::size_t positions = 0;
+  std::size_t jumps = 0;    ///< of its estimate
+  bool poses_come = false;  ///< attitudes and positions, so that there are poses between them
   std::size_t sectors_sent = 0;
   std::size_t sectors_stale = 0;  ///< too old when their turn came, so not sent
   std::size_t unsent = 0;         ///< packets that the port did not take
   std::string refused;            ///< the last request that the autopilot refused; empty if none
   Missing missing = Missing::camera;
 };
+
+/// For the pilot: what is missing, and of poses which message; at most the 44 characters that a STATUSTEXT
+/// has left.
+std::string text_of(const LinkReport& report, PoseMessages poses);
 
 /// One for each autopilot. step() belongs to one thread, all else to any.
 class AutopilotLink : public NavigationSource {
@@ -67,10 +74,12 @@ class AutopilotLink : public NavigationSource {
   void step(Time now, const Progress& progress);
 
   [[nodiscard]] PoseAnswer pose_at(Time time) const override;
-  [[nodiscard]] std::size_t jumps() const override;
   /// Sectors of a frame, sent at the next step unless they are older than 0.3 s by then; those before them
-  /// that were not sent are forgotten.
-  void offer(const mavlink::ObstacleDistance& sectors, Time frame);
+  /// that were not sent are forgotten. None: nothing could be said of any sector, and nothing is sent, since
+  /// receivers would take it for a sign of health.
+  void offer(const std::optional<mavlink::ObstacleDistance>& sectors, Time frame);
+  /// Says that there will be no more sectors. To be called when nobody calls step() any more.
+  void end();
   [[nodiscard]] LinkReport report() const;
 
  private:
@@ -78,17 +87,23 @@ class AutopilotLink : public NavigationSource {
   void take_timesync(const mavlink::Frame& frame, Time now);
   void ask(Time now);
   void send_sectors(Time now);
+  void turn_to_newest_heading(mavlink::ObstacleDistance& sectors, Time frame) const;
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);
+  void send_heartbeat(std::uint8_t state);
+  void refresh_report(Time now);
   template <class Message>
-  void send(const Message& message);
+  bool send(const Message& message);
 
   std::unique_ptr<Port> port_;
   LinkOptions options_;
   mavlink::Parser parser_;
   mavlink::Sender sender_;
-  Time next_question_, next_request_, next_heartbeat_;
-  std::size_t asked_for_ = 0;  // pose messages when the streams were last asked for
+  Time next_question_, next_request_, next_heartbeat_, next_text_, earliest_heartbeat_;
+  Time heard_;                          // the autopilot's heartbeat, last
+  std::optional<Missing> said_;         // in the last text
+  std::size_t attitudes_asked_at_ = 0;  // how many had come when the streams were last asked for
+  std::size_t positions_asked_at_ = 0;
 
   mutable std::mutex mutex_;  // of all below
   AutopilotPoses poses_;
@@ -96,6 +111,7 @@ class AutopilotLink : public NavigationSource {
   LinkReport report_;
   std::optional<mavlink::ObstacleDistance> offered_;
   Time offered_frame_;
+  LinkProgress progress_;
 };
 
 }  // namespace pade::live

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
@@ -56,12 +58,12 @@ Bracket bracket(const Samples& samples, Time time) {
 }  // namespace
 
 template <class Samples, class Value>
-void AutopilotPoses::push(Samples& samples, Time time, const Value& value) {
+bool AutopilotPoses::push(Samples& samples, Time time, const Value& value) {
   if (!samples.empty() && seconds_between(time, samples.back().time) > 1) jump();  // its clock went back
-  if (!samples.empty() && time <= samples.back().time) return;
+  if (!samples.empty() && time <= samples.back().time) return false;
   samples.push_back({time, value});
-  ++count_;
   while (seconds_between(samples.front().time, time) > kKept) samples.pop_front();
+  return true;
 }
 
 void AutopilotPoses::jump() {
@@ -70,28 +72,53 @@ void AutopilotPoses::jump() {
   ++jumps_;
 }
 
-void AutopilotPoses::add_attitude(Time time, const Quaterniond& q_ned_frd) {
+/// @param rate  how fast it says that it turns, rad/s; NaN: not known
+void AutopilotPoses::add_attitude(Time time, const Quaterniond& q_ned_frd, double rate) {
   // North is y of ENU; forward-right-down and forward-left-up differ by half a turn about x.
   static const Quaterniond R_enu_ned((Eigen::Matrix3d() << 0, 1, 0, 1, 0, 0, 0, 0, -1).finished());
   static const Quaterniond R_frd_flu(0, 1, 0, 0);
   if (!(std::abs(q_ned_frd.norm() - 1) < 0.01)) return;
-  push(attitudes_, time, (R_enu_ned * q_ned_frd * R_frd_flu).normalized());
+  const Quaterniond turn = (R_enu_ned * q_ned_frd * R_frd_flu).normalized();
+  if (!attitudes_.empty()) {
+    // A heading that is set anew: no vehicle turns by that much and says that it does not.
+    constexpr double kUnsaid = 0.15;  // rad
+    const double dt = seconds_between(attitudes_.back().time, time);
+    const double most = std::max(rate_, rate) * dt + kUnsaid;  // NaN: compares as false
+    if (dt > 0 && dt <= kFarthestApart && attitudes_.back().value.angularDistance(turn) > most) jump();
+  }
+  if (!push(attitudes_, time, turn)) return;
+  rate_ = rate;
+  ++attitudes_come_;
 }
 
-void AutopilotPoses::add_position(Time time, const Vector3d& ned) {
+void AutopilotPoses::add_position(Time time, const Vector3d& ned, const Vector3d& velocity_ned) {
   if (!ned.allFinite()) return;
-  push(positions_, time, Vector3d(ned.y(), ned.x(), -ned.z()));
+  const Vector3d place(ned.y(), ned.x(), -ned.z());
+  const Vector3d velocity(velocity_ned.y(), velocity_ned.x(), -velocity_ned.z());
+  if (!positions_.empty()) {
+    constexpr double kUnsaid = 0.3;       // m
+    constexpr double kUnsaidSpeed = 0.5;  // m/s
+    const double dt = seconds_between(positions_.back().time, time);
+    const Vector3d expected = positions_.back().value + dt / 2 * (velocity_ + velocity);
+    if (dt > 0 && dt <= kFarthestApart && (place - expected).norm() > kUnsaid + kUnsaidSpeed * dt) jump();
+  }
+  if (!push(positions_, time, place)) return;
+  velocity_ = velocity;
+  ++positions_come_;
 }
 
 void AutopilotPoses::add_odometry(const mavlink::Frame& frame) {
   constexpr std::uint8_t kLocalNed = 1;
   const auto m = unpack<mavlink::Odometry>(frame);
-  if (!m || m->frame_id != kLocalNed) return;
+  constexpr std::int8_t kFailed = -1;  // quality
+  if (!m || m->frame_id != kLocalNed || m->quality == kFailed) return;
   if (reset_counter_ >= 0 && reset_counter_ != m->reset_counter) jump();
   reset_counter_ = m->reset_counter;
   const Time time{static_cast<std::int64_t>(m->time_usec % 4'600'000'000'000'000) * 1000};
-  add_attitude(time, quaternion(m->q[0], m->q[1], m->q[2], m->q[3]));
-  add_position(time, vector(m->x, m->y, m->z));
+  // It counts its resets itself, and its velocity is in a frame of the body.
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  add_attitude(time, quaternion(m->q[0], m->q[1], m->q[2], m->q[3]), kNotKnown);
+  add_position(time, vector(m->x, m->y, m->z), Vector3d::Constant(kNotKnown));
 }
 
 void AutopilotPoses::add(const mavlink::Frame& frame) {
@@ -101,12 +128,15 @@ void AutopilotPoses::add(const mavlink::Frame& frame) {
   }
   if (const auto m = unpack<mavlink::AttitudeQuaternion>(frame)) {
     quaternions_ = true;
-    add_attitude(since_start(m->time_boot_ms), quaternion(m->q1, m->q2, m->q3, m->q4));
+    add_attitude(since_start(m->time_boot_ms), quaternion(m->q1, m->q2, m->q3, m->q4),
+                 vector(m->rollspeed, m->pitchspeed, m->yawspeed).norm());
   } else if (const auto a = unpack<mavlink::Attitude>(frame); a && !quaternions_) {
     const Vector3d angles = vector(a->roll, a->pitch, a->yaw);
-    add_attitude(since_start(a->time_boot_ms), from_angles(angles.x(), angles.y(), angles.z()));
+    // Rates of the body about its own axes, as those of the quaternion.
+    add_attitude(since_start(a->time_boot_ms), from_angles(angles.x(), angles.y(), angles.z()),
+                 vector(a->rollspeed, a->pitchspeed, a->yawspeed).norm());
   } else if (const auto p = unpack<mavlink::LocalPositionNed>(frame)) {
-    add_position(since_start(p->time_boot_ms), vector(p->x, p->y, p->z));
+    add_position(since_start(p->time_boot_ms), vector(p->x, p->y, p->z), vector(p->vx, p->vy, p->vz));
   }
 }
 
@@ -114,10 +144,10 @@ PoseAnswer AutopilotPoses::at(Time time) const {
   const Bracket turn = bracket(attitudes_, time);
   const Bracket place = bracket(positions_, time);
   using Kind = PoseAnswer::Kind;
-  if (turn.kind == Kind::never) return {Kind::never, {}, turn.why};
-  if (place.kind == Kind::never) return {Kind::never, {}, place.why};
-  if (turn.kind == Kind::not_yet || place.kind == Kind::not_yet) return {};
-  PoseAnswer answer{Kind::valid, {}, {}};
+  if (turn.kind == Kind::never) return {Kind::never, {}, turn.why, jumps_};
+  if (place.kind == Kind::never) return {Kind::never, {}, place.why, jumps_};
+  if (turn.kind == Kind::not_yet || place.kind == Kind::not_yet) return {Kind::not_yet, {}, {}, jumps_};
+  PoseAnswer answer{Kind::valid, {}, {}, jumps_};
   const auto& q = attitudes_[turn.after].value;
   const auto& p = positions_[place.after].value;
   answer.T_world_body.rotation =
@@ -125,6 +155,17 @@ PoseAnswer AutopilotPoses::at(Time time) const {
   answer.T_world_body.translation =
       place.share < 1 ? Vector3d((1 - place.share) * positions_[place.after - 1].value + place.share * p) : p;
   return answer;
+}
+
+double AutopilotPoses::turned_since(Time time) const {
+  const Bracket then = bracket(attitudes_, time);
+  if (then.kind != PoseAnswer::Kind::valid) return 0;
+  const auto heading = [](const Quaterniond& rotation) {
+    const Vector3d ahead = rotation * Vector3d::UnitX();
+    return std::atan2(ahead.y(), ahead.x());
+  };
+  return std::remainder(heading(attitudes_[then.after].value) - heading(attitudes_.back().value),
+                        2 * std::numbers::pi);
 }
 
 Time AutopilotPoses::newest() const {

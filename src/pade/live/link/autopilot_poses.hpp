@@ -29,8 +29,9 @@ struct PoseAnswer {
     never,    ///< they will not come any more
   };
   Kind kind = Kind::not_yet;
-  Pose T_world_body;     ///< ENU of the autopilot's origin, body FLU; if valid
-  std::string_view why;  ///< if never
+  Pose T_world_body;      ///< ENU of the autopilot's origin, body FLU; if valid
+  std::string_view why;   ///< if never
+  std::size_t jumps = 0;  ///< how often poses have jumped: what is before and after does not belong together
 };
 
 /// Keeps the last seconds of it. All times are the autopilot's, since its start.
@@ -43,11 +44,15 @@ class AutopilotPoses {
   /// Between two messages: rotation and position each on their straight way from the one before to the one
   /// after. No pose is extrapolated, and none comes from messages more than 0.25 s apart.
   [[nodiscard]] PoseAnswer at(Time time) const;
-  /// How often the estimate has jumped, as it says itself (ODOMETRY) or since its clock was set back: poses
-  /// before and after do not belong together, and those before are forgotten.
+  /// How often the estimate has jumped: as it says itself (reset counter of ODOMETRY), since its clock was
+  /// set back, or because a step or turn is not what its own velocity and rates say. Poses before are
+  /// forgotten.
   [[nodiscard]] std::size_t jumps() const { return jumps_; }
-  /// Attitudes and positions that came.
-  [[nodiscard]] std::size_t messages() const { return count_; }
+  [[nodiscard]] std::size_t attitudes() const { return attitudes_come_; }  ///< that came
+  [[nodiscard]] std::size_t positions() const { return positions_come_; }  ///< that came
+  /// How far the body has turned from a time to the newest attitude, clockwise seen from above, rad; 0 where
+  /// that is not known.
+  [[nodiscard]] double turned_since(Time time) const;
   /// Of the newest pose that can be answered; the start of time if there is none.
   [[nodiscard]] Time newest() const;
 
@@ -61,19 +66,22 @@ class AutopilotPoses {
   using Positions = std::deque<Sample<Eigen::Vector3d>>;
 
   template <class Samples, class Value>
-  void push(Samples& samples, Time time, const Value& value);
-  void add_attitude(Time time, const Eigen::Quaterniond& q_ned_frd);
-  void add_position(Time time, const Eigen::Vector3d& ned);
+  bool push(Samples& samples, Time time, const Value& value);
+  void add_attitude(Time time, const Eigen::Quaterniond& q_ned_frd, double rate);
+  void add_position(Time time, const Eigen::Vector3d& ned, const Eigen::Vector3d& velocity_ned);
   void add_odometry(const mavlink::Frame& frame);
   void jump();
 
   PoseMessages messages_;
   Attitudes attitudes_;
   Positions positions_;
-  bool quaternions_ = false;  // came: the angles are not needed
-  int reset_counter_ = -1;    // of ODOMETRY; -1: none yet
+  bool quaternions_ = false;                            // came: the angles are not needed
+  int reset_counter_ = -1;                              // of ODOMETRY; -1: none yet
+  double rate_ = 0;                                     // of the newest attitude, rad/s; NaN: not known
+  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();  // of the newest position, ENU, m/s; NaN: not known
   std::size_t jumps_ = 0;
-  std::size_t count_ = 0;
+  std::size_t attitudes_come_ = 0;
+  std::size_t positions_come_ = 0;
 };
 
 }  // namespace pade::live

@@ -16,19 +16,27 @@ std::string_view text_of(Missing missing) {
       return "the mapper does not get on";
     case Missing::depth:
       return "no depth: no parallax (hover?) or no texture";
+    case Missing::view:
+      return "nothing is seen at this height";
+    case Missing::late:
+      return "sectors are too old: the mapper is slow";
   }
   return "";
 }
 
-Missing missing_now(Time now, const Progress& progress, std::int64_t pose, bool synchronised) {
+Missing missing_now(Time now, const Progress& progress, const LinkProgress& link) {
+  constexpr double kAhead = 0.05;  // s: clocks differ by less
   const auto stale = [&](std::int64_t last) {
-    return last == 0 || static_cast<double>(now.nanoseconds - last) * 1e-9 > kStale;
+    const double age = static_cast<double>(now.nanoseconds - last) * 1e-9;
+    return last == 0 || age > kStale || age < -kAhead;
   };
   if (stale(progress.image)) return Missing::camera;
-  if (!synchronised) return Missing::clock;
-  if (stale(pose)) return Missing::pose;
+  if (!link.synchronised) return Missing::clock;
+  if (stale(link.pose)) return Missing::pose;
   if (stale(progress.mapper)) return Missing::mapper;
   if (stale(progress.depth)) return Missing::depth;
+  if (link.empty > link.offered) return Missing::view;
+  if (link.offered != 0 && stale(link.sent)) return Missing::late;
   return Missing::nothing;
 }
 

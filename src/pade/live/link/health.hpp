@@ -17,7 +17,16 @@ struct Progress {
 };
 
 /// The first input that is missing.
-enum class Missing : std::uint8_t { nothing, camera, clock, pose, mapper, depth };
+enum class Missing : std::uint8_t {
+  nothing,
+  camera,
+  clock,
+  pose,
+  mapper,
+  depth,
+  view,  ///< there is depth, but not at the vehicle's height
+  late,  ///< sectors are older than they may be when their turn comes
+};
 
 /// For the pilot: "no image from the camera".
 std::string_view text_of(Missing missing);
@@ -25,8 +34,16 @@ std::string_view text_of(Missing missing);
 /// Older than this is missing, s: with a heartbeat that follows at once it is said within 0.5 s.
 inline constexpr double kStale = 0.4;
 
-/// @param pose          time of the newest pose, ours, ns
-/// @param synchronised  with the autopilot's clock
-Missing missing_now(Time now, const Progress& progress, std::int64_t pose, bool synchronised);
+/// What only the link knows of. Times are ours, ns; 0: never.
+struct LinkProgress {
+  bool synchronised = false;  ///< with the autopilot's clock
+  std::int64_t pose = 0;      ///< of the newest pose
+  std::int64_t empty = 0;     ///< frame of the newest sectors that say nothing; they are not sent
+  std::int64_t offered = 0;   ///< of the newest that say something
+  std::int64_t sent = 0;      ///< of the newest that were sent
+};
+
+/// A time in the future is as bad as an old one: it is of another clock.
+Missing missing_now(Time now, const Progress& progress, const LinkProgress& link);
 
 }  // namespace pade::live

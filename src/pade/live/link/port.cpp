@@ -86,7 +86,7 @@ Descriptor open_line(const std::string& device, speed_t speed) {
   if (!line.open() || ::tcgetattr(line.get(), &settings) != 0) return Descriptor();
   ::cfmakeraw(&settings);
   settings.c_cflag |= CLOCAL | CREAD;
-  settings.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS);
+  settings.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB);
   ::cfsetispeed(&settings, speed);
   ::cfsetospeed(&settings, speed);
   if (::tcsetattr(line.get(), TCSANOW, &settings) != 0) return Descriptor();

@@ -139,8 +139,10 @@ const Ulog::Topic* Ulog::find(std::string_view name, int instance) const {
 }
 
 /// Bytes of a type, which may be another format; empty if it is not known, or holds itself.
+/// Nothing where it is more than a message can hold, so that no sum of sizes wraps.
 std::optional<std::size_t> Ulog::size_of(const std::string& type, int depth) const {
   constexpr int kDeepest = 8;
+  constexpr std::size_t kLargest = 65535;
   if (const BasicType* const known = basic_type(type)) return known->size;
   const auto format = formats_.find(type);
   if (format == formats_.end() || depth > kDeepest) return std::nullopt;
@@ -149,6 +151,7 @@ std::optional<std::size_t> Ulog::size_of(const std::string& type, int depth) con
     const auto size = size_of(field.type, depth + 1);
     if (!size) return std::nullopt;
     total += *size * field.count;
+    if (total > kLargest) return std::nullopt;
   }
   return total;
 }
@@ -170,6 +173,7 @@ std::optional<Ulog::Place> Ulog::place_of(const std::string& format, std::string
       return Place{candidate.type, offset + index * *size};
     }
     offset += *size * candidate.count;
+    if (offset > std::numeric_limits<std::uint16_t>::max()) return std::nullopt;  // beyond any message
   }
   return std::nullopt;
 }

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/navigation/geodetic_fixes.hpp"
 #include "pade/io/text.hpp"
-#include "pade/live/geodetic_fixes.hpp"
 #include "pade/live/recordings/ulog.hpp"
 
 namespace pade::live {
@@ -66,7 +66,7 @@ std::vector<ImuSample> imu_of(const Columns& columns) {
   return samples;
 }
 
-std::vector<GeodeticFix> fixes_of(const Columns& columns) {
+std::vector<io::GeodeticFix> fixes_of(const Columns& columns) {
   constexpr double kThreeDimensions = 3;
   const bool degrees = columns.has("latitude_deg");  // since PX4 1.15
   const double angle = degrees ? 1 : 1e-7;
@@ -78,17 +78,17 @@ std::vector<GeodeticFix> fixes_of(const Columns& columns) {
   const Column across = columns.get("eph"), up = columns.get("epv"), speed = columns.get("s_variance_m_s");
   const Column north = columns.get("vel_n_m_s"), east = columns.get("vel_e_m_s"),
                down = columns.get("vel_d_m_s");
-  std::vector<GeodeticFix> fixes;
+  std::vector<io::GeodeticFix> fixes;
   for (std::size_t i = 0; i < columns.rows(); ++i) {
     const auto time = time_of_microseconds(times[i]);
-    GeodeticFix fix{time.value_or(Time{}),
-                    angle * latitudes[i],
-                    angle * longitudes[i],
-                    length * heights[i],
-                    across[i],
-                    up[i],
-                    {},
-                    speed[i]};
+    io::GeodeticFix fix{time.value_or(Time{}),
+                        angle * latitudes[i],
+                        angle * longitudes[i],
+                        length * heights[i],
+                        across[i],
+                        up[i],
+                        {},
+                        speed[i]};
     const bool on_earth =
         std::abs(fix.latitude) <= 90 && std::abs(fix.longitude) <= 180 && std::isfinite(fix.height);
     if (!time || !on_earth || !(kinds[i] >= kThreeDimensions)) continue;
@@ -139,12 +139,12 @@ Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file) {
     return Error{fmt::format("{}: the IMU is missing: found no usable sensor_combined among its {} topics",
                              file.string(), ulog->topics().size())};
   }
-  std::vector<GeodeticFix> fixes;
+  std::vector<io::GeodeticFix> fixes;
   for (const char* const name : {"vehicle_gps_position", "sensor_gps"}) {
     const auto* const topic = ulog->find(name);
     if (topic == nullptr || !fixes.empty()) continue;
     fixes = fixes_of({*ulog, *topic});
-    if (!fixes.empty()) log.gnss = local_log(fixes, name, log.remarks);
+    if (!fixes.empty()) log.gnss = io::local_log(fixes, name, log.remarks);
   }
   if (fixes.empty()) {
     return Error{fmt::format(

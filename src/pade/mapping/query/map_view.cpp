@@ -43,6 +43,40 @@ void count(const TileTree& tiles, const VoxelIndex& v, Contents& contents, int& 
   highest = std::max<int>(highest, tile.log_odds[index_in_tile(v)]);
 }
 
+/// A tile that knows anything, by the Morton code of its place among the tiles.
+struct PlacedTile {
+  std::uint64_t code;
+  const Tile* tile;
+};
+
+bool knows_anything(const Tile& tile) {
+  return std::any_of(tile.words.begin(), tile.words.end(),
+                     [](const Tile::Word& word) { return word.known != 0; });
+}
+
+bool is_uniform(const Tile& tile) {
+  const std::uint64_t occupied = tile.any_occupied ? ~std::uint64_t{0} : 0;
+  return !tile.any_unknown && std::all_of(tile.words.begin(), tile.words.end(), [&](const Tile::Word& word) {
+    return word.occupied == occupied;
+  }) && std::all_of(tile.log_odds.begin(), tile.log_odds.end(), [&](std::int8_t value) {
+    return value == tile.log_odds[0];
+  });
+}
+
+void visit_tile(const PlacedTile& placed, double step, const std::function<void(const MapLeaf&)>& visitor) {
+  const Tile& tile = *placed.tile;
+  const std::uint64_t first = placed.code << 9U;
+  const auto log_odds = [&](std::size_t i) { return static_cast<float>(step * tile.log_odds[i]); };
+  if (is_uniform(tile))
+    return visitor({first, kTileDepth, log_odds(0), tile.at(0, 0, 0) == Occupancy::occupied});
+  for (std::uint64_t i = 0; i < tile.log_odds.size(); ++i) {
+    const VoxelKey v = morton_key(i);
+    const Occupancy state = tile.at(v[0], v[1], v[2]);
+    if (state != Occupancy::unknown)
+      visitor({first + i, kTreeDepth, log_odds(i), state == Occupancy::occupied});
+  }
+}
+
 constexpr int kNothingKnown = -1000;
 
 void set_probability(Contents& contents, int highest, double step) {
@@ -156,6 +190,29 @@ Contents MapView::in_ball(const Vector3d& centre, double radius) const {
   }
   set_probability(contents, highest, tiles_->step);
   return contents;
+}
+
+void MapView::for_each_leaf(const std::function<void(const MapLeaf&)>& visitor) const {
+  const TileBounds& bounds = tiles_->bounds;
+  std::vector<PlacedTile> known;
+  constexpr int kSide = 1 << TileGroup::kBits;  // tiles of a group
+  const auto group_of = [](int tile) { return tile / kSide; };
+  for (int z = group_of(bounds.first[2]); z <= group_of(bounds.last[2]); ++z)
+    for (int y = group_of(bounds.first[1]); y <= group_of(bounds.last[1]); ++y)
+      for (int x = group_of(bounds.first[0]); x <= group_of(bounds.last[0]); ++x) {
+        const TileGroup& group = tiles_->group(x, y, z);
+        for (unsigned i = 0; i < group.children.size(); ++i) {
+          if (!knows_anything(*group.children[i])) continue;
+          const auto key = [&](int of_group, unsigned inside) {
+            return static_cast<std::uint16_t>(of_group * kSide + static_cast<int>(inside & 7U));
+          };
+          known.push_back(
+              {morton_code({key(x, i), key(y, i >> 3U), key(z, i >> 6U)}), group.children[i].get()});
+        }
+      }
+  std::sort(known.begin(), known.end(),
+            [](const PlacedTile& a, const PlacedTile& b) { return a.code < b.code; });
+  for (const PlacedTile& tile : known) visit_tile(tile, tiles_->step, visitor);
 }
 
 }  // namespace pade::mapping

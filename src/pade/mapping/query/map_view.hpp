@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -108,6 +109,10 @@ class MapView {
   /// @param unknown  whether space that nobody has seen blocks
   [[nodiscard]] std::optional<Hit> sweep(std::span<const Eigen::Vector3d> path, double radius,
                                          UnknownSpace unknown) const;
+
+  /// Calls `visitor` for every known cube in the order of OctoMap's octree: single voxels, and cubes of 8 to
+  /// a side that are the same all over. Log-odds to 0.5 % of their range.
+  void for_each_leaf(const std::function<void(const MapLeaf&)>& visitor) const;
 
   /// For the room's own searches.
   [[nodiscard]] const TileTree& tiles() const { return *tiles_; }

@@ -44,28 +44,6 @@ double range_variance(const SatelliteView& view, bool air_is_corrected, const Po
          troposphere * troposphere;
 }
 
-/// Directions and delays as seen from a position; satellites below the mask are `low`.
-void look_from(const Eigen::Vector3d& position, std::span<SatelliteView> views,
-               const std::optional<Atmosphere>& atmosphere, const PositioningOptions& options) {
-  const Geodetic place = geodetic_of(position);
-  const Eigen::Matrix3d axes = enu_axes(place);
-  for (SatelliteView& view : views) {
-    if (view.use != Use::used && view.use != Use::low && view.use != Use::outlier) continue;
-    view.direction = direction_of(view.state.position - position, axes);
-    view.use = view.direction.elevation < options.elevation_mask ? Use::low : Use::used;
-    if (!atmosphere) continue;
-    const double troposphere = troposphere_delay(place, view.direction);
-    double ionosphere = 0;
-    if (atmosphere->ionosphere && place.height > -1e4 && place.height < 1e5) {
-      const double ratio = view.wavelength * kIonosphereFrequency / kSpeedOfLight;
-      ionosphere =
-          ratio * ratio * ionosphere_delay(*atmosphere->ionosphere, place, view.direction, atmosphere->time);
-    }
-    view.air = troposphere + ionosphere;
-    view.air_of_phase = troposphere - ionosphere;
-  }
-}
-
 /// From anywhere to within some 10 m, without air or mask.
 std::optional<Eigen::Vector3d> search(std::span<SatelliteView> views, double gate) {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -217,6 +195,33 @@ void add_phase(const PhasePair& pair, const Eigen::Vector3d& from, const Eigen::
 }
 
 }  // namespace
+
+ViewSigmas sigmas_of(const SatelliteView& view, bool air_is_corrected, const PositioningOptions& options) {
+  const double factor = noise_factor(view, options);
+  return {std::sqrt(range_variance(view, air_is_corrected, options)), options.doppler_sigma * factor,
+          options.phase_sigma * factor};
+}
+
+void look_from(const Eigen::Vector3d& position, std::span<SatelliteView> views,
+               const std::optional<Atmosphere>& atmosphere, const PositioningOptions& options) {
+  const Geodetic place = geodetic_of(position);
+  const Eigen::Matrix3d axes = enu_axes(place);
+  for (SatelliteView& view : views) {
+    if (view.use != Use::used && view.use != Use::low && view.use != Use::outlier) continue;
+    view.direction = direction_of(view.state.position - position, axes);
+    view.use = view.direction.elevation < options.elevation_mask ? Use::low : Use::used;
+    if (!atmosphere) continue;
+    const double troposphere = troposphere_delay(place, view.direction);
+    double ionosphere = 0;
+    if (atmosphere->ionosphere && place.height > -1e4 && place.height < 1e5) {
+      const double ratio = view.wavelength * kIonosphereFrequency / kSpeedOfLight;
+      ionosphere =
+          ratio * ratio * ionosphere_delay(*atmosphere->ionosphere, place, view.direction, atmosphere->time);
+    }
+    view.air = troposphere + ionosphere;
+    view.air_of_phase = troposphere - ionosphere;
+  }
+}
 
 std::optional<PositionFix> locate(std::span<SatelliteView> views, const std::optional<Atmosphere>& atmosphere,
                                   const PositioningOptions& options,

@@ -115,15 +115,29 @@ std::vector<SatelliteView> views_of(const Epoch& epoch, const BroadcastData& bro
 /// The same of known ranges.
 std::vector<SatelliteView> views_of(const KnownRangeEpoch& epoch);
 
-/// Least squares on pseudoranges: position, and a clock for each system. Writes directions, uses and
-/// residuals into the views. Empty if the satellites are too few or the solution does not converge near the
-/// Earth.
-/// @param guess  a position within some 100 km; without it the search begins at the Earth's centre
-/// @param atmosphere  how the air is corrected: nothing without (known ranges)
+/// What is known of the errors of a satellite's measurements.
+struct ViewSigmas {
+  double range = 0;  ///< m
+  double rate = 0;   ///< m/s
+  double phase = 0;  ///< m
+};
+/// @param air_is_corrected  false for known ranges
+ViewSigmas sigmas_of(const SatelliteView& view, bool air_is_corrected, const PositioningOptions& options);
+
+/// How the air is corrected.
 struct Atmosphere {
   Time time;
   std::optional<IonosphereModel> ionosphere;  ///< without it only the troposphere
 };
+/// Writes directions and delays as seen from a position, ECEF; satellites below the mask are `low`, others
+/// that have a state `used`. Without `atmosphere` there are no delays (known ranges).
+void look_from(const Eigen::Vector3d& position, std::span<SatelliteView> views,
+               const std::optional<Atmosphere>& atmosphere, const PositioningOptions& options);
+
+/// Least squares on pseudoranges: position, and a clock for each system. Writes directions, uses and
+/// residuals into the views. Empty if the satellites are too few or the solution does not converge near the
+/// Earth.
+/// @param guess  a position within some 100 km; without it the search begins at the Earth's centre
 std::optional<PositionFix> locate(std::span<SatelliteView> views, const std::optional<Atmosphere>& atmosphere,
                                   const PositioningOptions& options,
                                   const std::optional<Eigen::Vector3d>& guess = {});

@@ -164,11 +164,16 @@ EphemerisChoice judge(const Ephemeris* best, const Ephemeris* EphemerisChoice::*
   return choice;
 }
 
+double clock_at(const KeplerEphemeris& e, double since_toe) { return satellite_state(e, since_toe).clock; }
+double clock_at(const GlonassEphemeris& e, double since_toe) {
+  return e.clock + e.clock_rate * since_toe;  // without the orbit, which takes long
+}
+
 template <class Ephemeris>
 SatelliteState at_transmission(const Ephemeris& e, Time received, double pseudorange) {
   const double shown = seconds_between(e.toe, received) - pseudorange / kSpeedOfLight;
   // The satellite's own clock showed `shown`; it changes by 1e-9 s in the time that it is wrong by.
-  return satellite_state(e, shown - satellite_state(e, shown).clock);
+  return satellite_state(e, shown - clock_at(e, shown));
 }
 
 }  // namespace

@@ -88,8 +88,9 @@ void Filter::shift_common_position(const Matrix3d& covariance) {
   // A common shift δ of the world moves every ρ by R^T δ and leaves all relative motion as it is.
   Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMaxState, 3> G = decltype(G)::Zero(size(), 3);
   G.middleRows<3>(kRho) = core_.state.X.R.toRotationMatrix().transpose();
+  if (options_.raw_gnss) G.middleRows<3>(kAnchorPosition).setIdentity();
   for (int i = 0; i < clones_; ++i) {
-    G.middleRows<3>(kBase + 6 * i + 3) = clone_poses_[static_cast<std::size_t>(i)].matrix3().transpose();
+    G.middleRows<3>(clone_at(i) + 3) = clone_poses_[static_cast<std::size_t>(i)].matrix3().transpose();
   }
   P_ += G * covariance * G.transpose();
 }

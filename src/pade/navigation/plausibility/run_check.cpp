@@ -32,6 +32,8 @@ const char* name_of(SensorKind kind) {
       return "range";
     case SensorKind::road:
       return "road";
+    case SensorKind::raw_gnss:
+      return "raw_gnss";
   }
   return "";
 }

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "pade/io/foreign_file.hpp"
+#include "pade/io/recording/recording.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
@@ -22,7 +23,7 @@ void replace(std::optional<T>& value, const std::optional<T>& other) {
 
 /// What `other` states instead of what `base` states.
 void override_with(Calibration& base, const Calibration& other) {
-  base.format = other.format;
+  if (other.camera) base.format = other.format;
   replace(base.camera, other.camera);
   replace(base.T_body_camera, other.T_body_camera);
   replace(base.time_offset_s, other.time_offset_s);
@@ -66,7 +67,7 @@ Result<Calibration> with_overrides(Calibration base, const fs::path& folder, con
     const bool asked_for = !choice.calibration_file.empty() && file == files.back();
     const auto read = read_calibration(file, asked_for ? choice.camera : 0);
     if (!read) return read.error();
-    if (asked_for && !read->camera) {
+    if (asked_for && !read->camera && !(choice.mounting_alone && read->T_body_camera)) {
       return Error{
           fmt::format("{}: found no camera in it, expected the calibration that was asked for (known "
                       "dialects: docs/formats.md)",
@@ -82,10 +83,11 @@ Result<Calibration> with_overrides(Calibration base, const fs::path& folder, con
 
 Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& choice, ReadReport& report) {
   if (!path_exists(folder)) return Error{fmt::format("{}: no such folder", folder.string())};
+  if (is_recording(folder)) return read_recording_layout(folder, choice, report);
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) {
-    return Error{fmt::format("{}: is a file, expected the folder of a sequence{}", folder.string(),
-                             advice_for(folder))};
+    return Error{fmt::format("{}: is a file, expected the folder of a sequence or a recording of ROS{}",
+                             folder.string(), advice_for(folder))};
   }
   if (path_exists(folder / "mav0" / "cam0") || path_exists(folder / "cam0" / "data.csv")) {
     return read_euroc_layout(folder, choice, report);

@@ -1,9 +1,10 @@
-// What a folder layout (TUM RGB-D, EuRoC, KITTI odometry, TartanAir, ICL-NUIM) delivers to Sequence: lists,
-// not yet pixels.
+// What a layout (TUM RGB-D, EuRoC, KITTI odometry, TartanAir, ICL-NUIM, or a recording) delivers to Sequence:
+// lists, not yet pixels.
 #pragma once
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 
 #include "pade/core/result.hpp"
 #include "pade/io/sequence/calibration.hpp"
+#include "pade/io/sequence/image_store.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/io/skipped.hpp"
 
@@ -23,15 +25,17 @@ struct StampedFile {
 
 /// The lists of a sequence as found, in the order of the files.
 struct SequenceListing {
-  std::string layout;  ///< "TUM RGB-D", "EuRoC", "KITTI odometry", "TartanAir" or "ICL-NUIM"
+  std::string layout;                                                        ///< as Sequence::layout
+  std::shared_ptr<const ImageStore> store = std::make_shared<ImageStore>();  ///< reads `images`
   std::vector<StampedFile> images;
   std::vector<StampedFile> depth;  ///< truth, may be empty
   std::filesystem::path pose_file;
-  Trajectory trajectory;                  ///< T_world_camera or T_world_body
-  bool poses_of_body = false;             ///< T_body_camera of `calibration` is to be applied
-  bool computed = false;                  ///< the trajectory is of the camera, at the times of the images
-  std::map<Time, Matrix6d> covariances;   ///< of computed poses: Frame::motion_covariance
-  std::size_t motions_without_scale = 0;  ///< of computed poses
+  Trajectory trajectory;                 ///< T_world_camera or T_world_body
+  bool poses_of_body = false;            ///< T_body_camera of `calibration` is to be applied
+  bool computed = false;                 ///< the trajectory is of the camera, at the times of the images
+  std::map<Time, Matrix6d> covariances;  ///< Frame::motion_covariance, of computed poses and of live sessions
+  cv::Mat mask;                          ///< on the undistorted grid, 255 = valid; empty: to be found
+  std::size_t motions_without_scale = 0;       ///< of computed poses
   std::optional<NavigationHealth> navigation;  ///< of computed poses
   std::size_t frames_without_pose = 0;         ///< known when frames and poses have met
   Calibration calibration;
@@ -44,6 +48,8 @@ struct LayoutChoice {
   std::filesystem::path calibration_file;  ///< empty = the layout's own
   bool computed = false;                   ///< the poses come from elsewhere: none are read
   int camera = 0;                          ///< of a calibration file that holds several
+  std::string topics;                      ///< of a recording (SequenceOptions::topics)
+  bool mounting_alone = false;             ///< a calibration file may state T_body_camera without a camera
 };
 
 Result<SequenceListing> read_tum_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
@@ -59,6 +65,10 @@ Result<SequenceListing> read_tartanair_layout(const std::filesystem::path& folde
 bool is_icl_nuim_layout(const std::filesystem::path& folder);
 Result<SequenceListing> read_icl_nuim_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
                                              ReadReport& report);
+
+/// A recording (recording/recording.hpp).
+Result<SequenceListing> read_recording_layout(const std::filesystem::path& file, const LayoutChoice& choice,
+                                              ReadReport& report);
 
 /// Recognises the layout and reads it.
 Result<SequenceListing> read_layout(const std::filesystem::path& folder, const LayoutChoice& choice,

@@ -1,11 +1,13 @@
-#include "pade/live/geodetic_fixes.hpp"
+#include "pade/io/navigation/geodetic_fixes.hpp"
+
+#include <cmath>
 
 #include <GeographicLib/LocalCartesian.hpp>
 #include <fmt/format.h>
 
 #include "pade/io/navigation/navigation_log.hpp"
 
-namespace pade::live {
+namespace pade::io {
 namespace {
 
 constexpr double kVerticalVelocity = 10;  // sigma of one that is not measured, m/s
@@ -14,7 +16,7 @@ constexpr double kVerticalVelocity = 10;  // sigma of one that is not measured, 
 struct Filler {
   std::size_t filled = 0;
   double operator()(double stated, double otherwise) {
-    if (stated > 0) return stated;
+    if (stated > 0 && std::isfinite(stated)) return stated;
     ++filled;
     return otherwise;
   }
@@ -22,9 +24,15 @@ struct Filler {
 
 }  // namespace
 
+double height_of_pressure(double hectopascal) {
+  return 44330.77 * (1 - std::pow(hectopascal / 1013.25, 0.1902632));
+}
+
+double pressure_at_height(double metres) { return 1013.25 * std::pow(1 - metres / 44330.77, 1 / 0.1902632); }
+
 GnssLog local_log(std::span<const GeodeticFix> fixes, const std::string& source,
                   std::vector<std::string>& remarks) {
-  const io::GnssDefaults defaults;
+  const GnssDefaults defaults;
   const GeodeticFix& first = fixes.front();
   GnssLog log;
   log.origin = GeodeticOrigin{first.latitude, first.longitude, first.height};
@@ -59,4 +67,4 @@ GnssLog local_log(std::span<const GeodeticFix> fixes, const std::string& source,
   return log;
 }
 
-}  // namespace pade::live
+}  // namespace pade::io

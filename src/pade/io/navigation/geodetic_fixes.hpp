@@ -11,7 +11,7 @@
 #include "pade/core/sensors/navigation_log.hpp"
 #include "pade/core/time.hpp"
 
-namespace pade::live {
+namespace pade::io {
 
 /// What a receiver says at one moment.
 struct GeodeticFix {
@@ -33,4 +33,9 @@ struct GeodeticFix {
 GnssLog local_log(std::span<const GeodeticFix> fixes, const std::string& source,
                   std::vector<std::string>& remarks);
 
-}  // namespace pade::live
+/// Of the standard atmosphere, up to 11 km: the height above sea level, m, where the pressure is so many hPa.
+double height_of_pressure(double hectopascal);
+/// The other way round, hPa.
+double pressure_at_height(double metres);
+
+}  // namespace pade::io

@@ -1,0 +1,68 @@
+// The map on disk while the session goes on, so that a power cut or a crash costs seconds of it and not the
+// flight.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "pade/live/interfaces.hpp"
+#include "pade/mapping/query/map_view.hpp"
+
+namespace pade::live {
+
+/// What was saved so far, and what could not be.
+struct SaverReport {
+  std::size_t saved = 0;              ///< times that a map was written
+  std::size_t failed = 0;             ///< times that it could not be
+  std::string error;                  ///< of the last failure
+  std::vector<std::string> finished;  ///< files of maps that ended because the poses jumped
+  std::string earlier;                ///< where the map of an earlier session went; empty: there was none
+};
+
+/// Writes the newest view of the map now and then, in a thread of its own: whoever offers one never waits. A
+/// file is replaced as a whole or not at all, and only by the map that it already holds: those of earlier
+/// sessions and of before a jump of the poses stay, under the first free number (map-1.bt, map-2.bt, ...).
+class MapSaver : public Sink {
+ public:
+  /// @param file   .bt or .ot
+  /// @param every  s between the end of one and the start of the next; 0: only maps that end because the
+  /// poses jump
+  MapSaver(std::filesystem::path file, double every);
+  ~MapSaver() override;
+  /// Ends what is being written and maps that have ended, then the thread. The newest view is left to whoever
+  /// saves the map at the end.
+  SaverReport finish();
+
+  void take(const LiveUpdate& update) override;
+  /// The map so far goes to a file of its own.
+  void begin_anew() override;
+  [[nodiscard]] SaverReport report() const;
+
+ private:
+  using View = std::shared_ptr<const mapping::MapView>;
+  void work();
+  void save(const View& view, bool is_finished);
+  [[nodiscard]] std::filesystem::path free_name() const;
+  void keep_earlier();
+
+  std::filesystem::path file_;
+  double every_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  View newest_;              // since the last save
+  View last_;                // of the map as it is
+  std::vector<View> ended_;  // maps that ended, to be saved
+  bool any_ = false;         // a view was offered
+  bool kept_earlier_ = false;
+  bool over_ = false;
+  SaverReport report_;
+  std::thread thread_;  // last: it uses all the others
+};
+
+}  // namespace pade::live

@@ -1,0 +1,49 @@
+// From what a receiver says to what the filter takes: satellites placed, corrected and weighed.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "pade/core/sensors/navigation_log.hpp"
+#include "pade/navigation/gnss/positioning.hpp"
+#include "pade/navigation/tight/raw_epoch.hpp"
+
+namespace pade::navigation {
+
+/// Where the local frame lies on the Earth.
+struct LocalFrame {
+  Vector3d origin = Vector3d::Zero();          ///< ECEF, m
+  Matrix3d R_enu_ecef = Matrix3d::Identity();  ///< gnss::enu_axes() of the origin
+  gnss::Geodetic place;                        ///< the origin once more
+
+  static LocalFrame at(const gnss::Geodetic& place);
+  static LocalFrame at(const GeodeticOrigin& origin);
+};
+
+/// Takes epochs in the order of their times.
+class RawObserver {
+ public:
+  /// @param broadcast  must outlive the observer
+  /// @param frame      without it that of the first position that is found
+  /// @param zero       GPS time at which the IMU's time scale is 0
+  RawObserver(const gnss::BroadcastData& broadcast, const gnss::PositioningOptions& options,
+              const std::optional<LocalFrame>& frame, Time zero);
+
+  /// Null until a first position has been found (4 satellites, and one more for each further system).
+  std::shared_ptr<const RawEpoch> observe(const gnss::Epoch& epoch);
+  /// That of the epochs; empty until there is one.
+  [[nodiscard]] const std::optional<LocalFrame>& frame() const { return frame_; }
+
+ private:
+  void add_fix(std::span<gnss::SatelliteView> views, const gnss::PositionFix& fix, RawEpoch& epoch) const;
+  [[nodiscard]] RawSatellite satellite_of(const gnss::SatelliteView& view) const;
+
+  const gnss::BroadcastData* broadcast_;
+  gnss::PositioningOptions options_;
+  std::optional<LocalFrame> frame_;
+  Time zero_;
+  std::optional<Vector3d> last_;  ///< position that was found, ECEF, m
+  std::optional<Vector3d> near_;  ///< ECEF, m; where directions and delays are taken from
+};
+
+}  // namespace pade::navigation

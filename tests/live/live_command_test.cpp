@@ -1,0 +1,150 @@
+// `pade live` as systemd and people run it: a process, an autopilot on the other end of the line, and
+// signals.
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "pade/io/formats/map_files.hpp"
+#include "pade/io/text.hpp"
+
+#include "apps/run_program.hpp"
+#include "live/udp_autopilot.hpp"
+
+namespace pade::live {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+
+constexpr int kPort = 24'583;
+
+class LiveCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / fmt::format("pade_live_command_{}", std::random_device{}());
+    fs::create_directories(folder_ / "flight" / "rgb");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// Past the wall of WallCamera, ten times a second.
+  void record(int frames) const {
+    constexpr double kRate = 10;
+    cv::Mat wall = textured_wall();
+    std::ofstream list(folder_ / "flight" / "rgb.txt");
+    for (int i = 0; i < frames; ++i) {
+      const std::string name = fmt::format("rgb/{:04d}.png", i);
+      ASSERT_TRUE(cv::imwrite((folder_ / "flight" / name).string(), image_of_wall(wall, i / kRate)));
+      list << fmt::format("{:.6f} {}\n", 100 + i / kRate, name);
+    }
+    std::ofstream(folder_ / "flight" / "camera.yaml")
+        << "width: 96\nheight: 64\nfx: 60\nfy: 60\ncx: 47.5\ncy: 31.5\ndistortion_model: none\n";
+  }
+  [[nodiscard]] fs::path config(const std::string& more = {}) const {
+    const fs::path file = folder_ / "live.yaml";
+    std::ofstream(file) << fmt::format(
+        "camera: {{kind: folder, path: {}}}\nlink: {{port: \"udp:{}\"}}\nsession: {{velocity_sigma: 0.02}}\n"
+        "mapper: {{map: {{voxel: 0.25}}}}\n{}",
+        (folder_ / "flight").string(), kPort, more);
+    return file;
+  }
+  [[nodiscard]] std::string map_line() const {
+    return fmt::format("map: {}\n", (folder_ / "map.bt").string());
+  }
+  [[nodiscard]] std::string said() const {
+    const auto text = io::read_file(folder_ / "said");
+    return text ? *text : std::string();
+  }
+  /// Starts the program, its output in the file "said".
+  [[nodiscard]] pid_t start(const fs::path& file) const {
+    const std::string out = (folder_ / "said").string();
+    const std::string yaml = file.string();
+    const pid_t child = ::fork();
+    if (child != 0) return child;
+    const int said = ::open(out.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0600);
+    ::dup2(said, STDOUT_FILENO);
+    ::dup2(said, STDERR_FILENO);
+    ::execl(PADE_PROGRAM, "pade", "live", yaml.c_str(), nullptr);
+    ::_exit(127);
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(LiveCommand, SavesItsMapOnSigtermWithinTwoSecondsAndOutlivesItsTerminal) {
+  record(200);
+  const pid_t session = start(config(map_line()));
+  ASSERT_GT(session, 0);
+  const UdpAutopilot autopilot(now_of_ours(), kPort);
+  const Time begun = now_of_ours();
+  while (autopilot.sectors().size() < 10 && seconds_between(begun, now_of_ours()) < 20)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ASSERT_GE(autopilot.sectors().size(), 10U) << said();
+  ::kill(session, SIGHUP);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ASSERT_EQ(::waitpid(session, nullptr, WNOHANG), 0) << "ended by a terminal that went away";
+  const Time told = now_of_ours();
+  ::kill(session, SIGTERM);
+  int status = -1;
+  ::waitpid(session, &status, 0);
+  EXPECT_LT(seconds_between(told, now_of_ours()), 2);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << said();
+  EXPECT_THAT(said(), AllOf(HasSubstr("map.bt: "), HasSubstr("voxels occupied"), HasSubstr(" mapped, ")));
+  const auto map = io::read_map(folder_ / "map.bt");
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_GT(map->counts().occupied, 50U);
+  EXPECT_THAT(autopilot.texts(), Contains(HasSubstr("obstacle mapping active")));
+  EXPECT_THAT(autopilot.texts().back(), HasSubstr("has ended"));
+}
+
+TEST_F(LiveCommand, CheckFindsWhatIsThereAndWhatIsNot) {
+  record(100);
+  const std::string command = fmt::format("{} live --check {}", test::kPade, config(map_line()).string());
+  {
+    const UdpAutopilot autopilot(now_of_ours(), kPort);
+    const test::Outcome all = test::shell(command);
+    EXPECT_EQ(all.code, 0) << all.text;
+    EXPECT_THAT(all.text, AllOf(HasSubstr("96 x 64"), HasSubstr("ArduPilot"), HasSubstr("attitudes")));
+  }
+  const test::Outcome none = test::shell(command);
+  EXPECT_EQ(none.code, 1);
+  EXPECT_THAT(none.text, AllOf(HasSubstr("no HEARTBEAT"), HasSubstr("something is missing")));
+  EXPECT_FALSE(fs::exists(folder_ / "map.bt"));
+}
+
+TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
+  record(3);
+  const struct {
+    std::string more, named;
+  } cases[] = {
+      {"map: " + (folder_ / "nowhere" / "map.bt").string() + "\n", "found no folder"},
+      {"map: map.las\n", ".bt or .ot"},
+      {"autosave: -1\n", "autosave is -1"},
+      {"sectors: {own_radius: 10, max_distance: 5}\n", "sectors.own_radius is 10"},
+      {"sectors: {max_distance: .nan}\n", "sectors.max_distance"},
+      {"mapper_: {}\n", "mapper_"},
+  };
+  for (const auto& c : cases) {
+    const test::Outcome refused =
+        test::shell(fmt::format("{} live {}", test::kPade, config(c.more).string()));
+    EXPECT_EQ(refused.code, 1) << c.named;
+    EXPECT_THAT(refused.text, AllOf(HasSubstr("pade live: "), HasSubstr(c.named)));
+  }
+  EXPECT_EQ(test::shell(test::kPade + " live " + (folder_ / "none.yaml").string()).code, 1);
+}
+
+}  // namespace
+}  // namespace pade::live

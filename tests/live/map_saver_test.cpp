@@ -1,0 +1,221 @@
+// The map on disk while a session goes on: whole at any moment, whatever ends the program.
+#include "pade/live/map_saver.hpp"
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <thread>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "pade/io/formats/map_files.hpp"
+#include "pade/io/text.hpp"
+#include "pade/live/service.hpp"
+
+namespace pade::live {
+namespace {
+
+namespace fs = std::filesystem;
+using mapping::MapView;
+using mapping::OccupancyMap;
+
+/// Walls at so many metres, one behind the other, each seen from the near side.
+std::shared_ptr<const MapView> walls(int count) {
+  Camera camera;
+  camera.width = 40;
+  camera.height = 30;
+  camera.fx = camera.fy = 30;
+  camera.cx = 19.5;
+  camera.cy = 14.5;
+  OccupancyMap map = std::move(OccupancyMap::create()).value();
+  for (int i = 0; i < count; ++i) {
+    DepthImage image;
+    image.time = Time{i * 100'000'000LL};
+    image.depth = cv::Mat(camera.height, camera.width, CV_32FC1, cv::Scalar(1 + 0.5 * i));
+    image.variance = cv::Mat(image.depth.size(), CV_32FC1, cv::Scalar(0));
+    image.state = cv::Mat(image.depth.size(), CV_8UC1, cv::Scalar(0));
+    Pose pose;
+    pose.translation.x() = 8.0 * i;
+    map.integrate(image, camera, pose);
+  }
+  return MapView::of(map);
+}
+
+LiveUpdate update_with(std::shared_ptr<const MapView> view) { return {Time{}, Pose{}, std::move(view), 1}; }
+
+std::string bytes_of_view(const MapView& view) {
+  return io::bytes_of(io::encode_map(view, io::MapFormat::bt));
+}
+
+class MapOnDisk : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / fmt::format("pade_map_saver_{}", std::random_device{}());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  [[nodiscard]] fs::path file(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] std::string content(const std::string& name) const {
+    const auto text = io::read_file(file(name));
+    return text ? *text : std::string();
+  }
+
+  fs::path folder_;
+};
+
+template <class Condition>
+bool within_seconds(double seconds, const Condition& condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+TEST_F(MapOnDisk, IsTheNewestViewWithinTheInterval) {
+  MapSaver saver(file("map.bt"), 0.05);
+  for (const int count : {1, 3}) {
+    const auto view = walls(count);
+    saver.take(update_with(view));
+    EXPECT_TRUE(within_seconds(5, [&] { return content("map.bt") == bytes_of_view(*view); })) << count;
+  }
+  const std::size_t saved = saver.report().saved;
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_EQ(saver.report().saved, saved) << "the same map is written again";
+}
+
+TEST_F(MapOnDisk, OfBeforeAJumpIsKeptUnderItsNumber) {
+  const auto first = walls(2);
+  const auto second = walls(1);
+  const auto third = walls(3);
+  MapSaver saver(file("map.bt"), 0);
+  saver.begin_anew();  // before anything was mapped: there is nothing to keep
+  saver.take(update_with(first));
+  saver.begin_anew();
+  saver.take(update_with(second));
+  saver.begin_anew();
+  saver.begin_anew();
+  saver.take(update_with(third));
+  const SaverReport report = saver.finish();
+  EXPECT_EQ(content("map-1.bt"), bytes_of_view(*first));
+  EXPECT_EQ(content("map-2.bt"), bytes_of_view(*second));
+  EXPECT_EQ(report.saved, 2U);
+  EXPECT_THAT(report.finished, testing::ElementsAre(file("map-1.bt").string(), file("map-2.bt").string()));
+  EXPECT_FALSE(fs::exists(file("map-3.bt")));
+  EXPECT_FALSE(fs::exists(file("map.bt"))) << "autosave is off";
+}
+
+/// Whoever starts the program again, systemd among them, finds what it had saved before.
+TEST_F(MapOnDisk, OfAnEarlierSessionIsKeptToo) {
+  const auto first = walls(1);
+  const auto second = walls(2);
+  for (int session = 0; session < 3; ++session) {
+    MapSaver saver(file("map.bt"), 0.02);
+    if (session == 1) continue;  // that maps nothing
+    saver.take(update_with(session == 0 ? first : second));
+    ASSERT_TRUE(within_seconds(5, [&] { return saver.report().saved > 0; }));
+    EXPECT_EQ(saver.finish().earlier, session == 0 ? "" : file("map-1.bt").string());
+  }
+  EXPECT_EQ(content("map-1.bt"), bytes_of_view(*first));
+  EXPECT_EQ(content("map.bt"), bytes_of_view(*second));
+  EXPECT_FALSE(fs::exists(file("map-2.bt")));
+}
+
+TEST_F(MapOnDisk, ThatCannotBeWrittenIsCountedAndNamed) {
+  MapSaver saver(folder_ / "nowhere" / "map.bt", 0.02);
+  saver.take(update_with(walls(1)));
+  ASSERT_TRUE(within_seconds(5, [&] { return saver.report().failed > 0; }));
+  const SaverReport report = saver.finish();
+  EXPECT_EQ(report.saved, 0U);
+  EXPECT_THAT(report.error, testing::HasSubstr("nowhere"));
+}
+
+/// As a power cut, at any moment: what lies there is the whole of one of the maps, and nothing but.
+TEST_F(MapOnDisk, IsWholeAfterFiftyKills) {
+  const std::array views{walls(1), walls(2), walls(3), walls(4)};
+  std::vector<std::string> bytes;
+  for (const auto& view : views) bytes.push_back(bytes_of_view(*view));
+  std::mt19937 random(3);
+  std::uniform_int_distribution<int> moment(2000, 40000);  // us
+  int there = 0;
+  for (int kill = 0; kill < 50; ++kill) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      MapSaver saver(file("map.bt"), 0.0005);
+      for (std::size_t i = 0;; ++i) {
+        saver.take(update_with(views[i % views.size()]));
+        std::this_thread::sleep_for(std::chrono::microseconds(300));
+      }
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(moment(random)));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      if (!entry.path().filename().string().starts_with("map")) continue;  // half of one, under a hidden name
+      const std::string left = content(entry.path().filename().string());
+      ASSERT_THAT(bytes, testing::Contains(left)) << "kill " << kill << ": " << left.size() << " bytes";
+      ++there;
+      fs::remove(entry.path());
+    }
+  }
+  EXPECT_GT(there, 40);
+}
+
+/// A socket as systemd has one.
+class Listener {
+ public:
+  explicit Listener(const std::string& address) : socket_(::socket(AF_UNIX, SOCK_DGRAM, 0)) {
+    sockaddr_un here{};
+    here.sun_family = AF_UNIX;
+    address.copy(here.sun_path, sizeof here.sun_path - 1);
+    if (address.front() == '@') here.sun_path[0] = '\0';
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address.size());
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<const sockaddr*>(&here), length), 0);
+  }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+  ~Listener() { ::close(socket_); }
+  [[nodiscard]] std::string next() const {
+    std::array<char, 512> buffer{};
+    const auto size = ::recv(socket_, buffer.data(), buffer.size(), MSG_DONTWAIT);
+    return size < 0 ? std::string() : std::string(buffer.data(), static_cast<std::size_t>(size));
+  }
+
+ private:
+  int socket_;
+};
+
+TEST_F(MapOnDisk, AndSystemdHearsOfTheSession) {
+  for (const std::string& address :
+       {file("notify").string(), fmt::format("@pade-test-{}", std::random_device{}())}) {
+    const Listener systemd(address);
+    const ServiceManager service(address);
+    EXPECT_TRUE(service.listens());
+    service.ready();
+    service.alive("no image from the camera\nREADY=0");
+    service.stopping();
+    EXPECT_EQ(systemd.next(), "READY=1");
+    EXPECT_EQ(systemd.next(), "WATCHDOG=1\nSTATUS=no image from the camera");
+    EXPECT_EQ(systemd.next(), "STOPPING=1");
+    EXPECT_EQ(systemd.next(), "");
+  }
+  EXPECT_FALSE(ServiceManager("").listens());
+  EXPECT_FALSE(ServiceManager("relative").listens());
+  EXPECT_FALSE(ServiceManager("/" + std::string(200, 'x')).listens());
+  ServiceManager(file("gone").string()).ready();  // nobody is there any more: no harm
+}
+
+}  // namespace
+}  // namespace pade::live
