@@ -63,7 +63,8 @@ TEST(ExactFlight, StandsStillBeforeAWallWithoutAWayAndTouchesNothing) {
 /// The climb is no part of the way: not its length, not its end, which is a standstill, not its time.
 TEST(FlightWatch, MeasuresTheWayAndNotTheClimb) {
   const Place place = columns({});
-  FlightWatch watch({place.scene, place.surface, {0, 0, 1.6}, {20, 0, 1.6}}, 0.35);
+  const FlightTask task{place.scene, place.surface, {0, 0, 1.6}, {20, 0, 1.6}};
+  FlightWatch watch(task, 0.35);
   for (int i = 0; i <= 800; ++i) {
     planning::MotionState state;
     state.time = i / 100.0;
