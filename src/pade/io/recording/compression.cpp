@@ -49,7 +49,7 @@ Result<std::string> from_bz2(std::string_view bytes, std::uint64_t expected) {
     stream.next_out = content.data() + had;
     stream.avail_out = static_cast<unsigned>(room);
     state = BZ2_bzDecompress(&stream);
-    content.resize(content.size() - stream.avail_out);
+    content.resize(had + room - std::min<std::size_t>(stream.avail_out, room));
     if (state == BZ_OK && content.size() == had && stream.avail_in == 0) break;
   }
   if (state != BZ_STREAM_END && content.size() <= expected)
