@@ -1,6 +1,7 @@
 // A measurement of any sensor but the IMU, and what the filter made of it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -61,6 +62,8 @@ enum class SensorKind : std::uint8_t {
   road,
   raw_gnss
 };
+inline constexpr std::size_t sensor_kinds =
+    static_cast<std::size_t>(SensorKind::raw_gnss) + 1;  ///< raw_gnss is the last
 
 /// A measurement of any kind.
 struct Measurement {

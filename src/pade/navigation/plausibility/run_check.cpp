@@ -67,8 +67,8 @@ void check_integrity(const Health& health, std::vector<Hint>& hints) {
 }  // namespace
 
 std::vector<SensorSummary> summarise(std::span<const Measurement> measurements) {
-  std::array<SensorSummary, 8> sums;
-  std::array<double, 8> freedom{};
+  std::array<SensorSummary, sensor_kinds> sums;
+  std::array<double, sensor_kinds> freedom{};
   for (const Measurement& m : measurements) {
     if (m.innovation.verdict == Verdict::unusable) continue;
     const auto kind = static_cast<std::size_t>(m.kind);
