@@ -17,6 +17,7 @@
 #include "pade/checks/scene_hardness.hpp"
 #include "pade/checks/sequence_check.hpp"
 #include "pade/io/atomic_output.hpp"
+#include "pade/io/foreign_file.hpp"
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/recording/recording.hpp"
 #include "pade/io/run/run_reader.hpp"
@@ -403,6 +404,8 @@ Status inform(const InfoArguments& arguments) {
   if (!fs::is_directory(path, code)) {
     if (live::is_tlog(path)) return inform_of_tlog(path, arguments.json);
     if (live::is_ulog(path)) return inform_of_ulog(path, arguments.json);
+    if (const std::string advice = io::advice_for(path); !advice.empty())
+      return Error{fmt::format("{}: cannot be read as what its name says{}", arguments.path, advice)};
     const bool map = path.extension() == ".bt" || path.extension() == ".ot";
     return map ? inform_of_map(arguments) : inform_of_calibration(path, arguments.camera, arguments.json);
   }

@@ -131,6 +131,7 @@ TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
     std::string more, named;
   } cases[] = {
       {"map: " + (folder_ / "nowhere" / "map.bt").string() + "\n", "found no folder"},
+      {"record: " + (folder_ / "nowhere" / "x.mcap").string() + "\n", "found no folder"},
       {"map: map.las\n", ".bt or .ot"},
       {"autosave: -1\n", "autosave is -1"},
       {"sectors: {own_radius: 10, max_distance: 5}\n", "sectors.own_radius is 10"},

@@ -71,7 +71,8 @@ struct LiveParts {
 Result<LiveParts> open_parts(const LiveArguments& arguments) {
   auto options = live::read_live_options(arguments.config);
   if (!options) return options.error();
-  if (const Status place = live::check_place_of_map(options->map); !place) return place.error();
+  if (const Status place = live::check_place("map", options->map); !place) return place.error();
+  if (const Status place = live::check_place("record", options->record); !place) return place.error();
   auto camera = live::open_camera(options->camera);
   if (!camera) return camera.error();
   auto port = live::open_port(options->link.port, options->link.baud);

@@ -45,14 +45,15 @@ Status check(const LiveOptions& options) {
   return within("mapper", check(options.mapper));
 }
 
-Status check_place_of_map(const std::string& map) {
-  if (map.empty()) return {};
+Status check_place(const std::string& field, const std::string& file) {
+  if (file.empty()) return {};
   std::error_code failed;
-  const fs::path folder = fs::absolute(map, failed).parent_path();
+  const fs::path folder = fs::absolute(file, failed).parent_path();
   if (failed || !fs::is_directory(folder, failed))
-    return Error{fmt::format("map: {}: found no folder {}, expected one that exists", map, folder.string())};
+    return Error{
+        fmt::format("{}: {}: found no folder {}, expected one that exists", field, file, folder.string())};
   if (::access(folder.c_str(), W_OK) != 0)
-    return Error{fmt::format("map: {}: the folder {} cannot be written to", map, folder.string())};
+    return Error{fmt::format("{}: {}: the folder {} cannot be written to", field, file, folder.string())};
   return {};
 }
 

@@ -66,8 +66,10 @@ struct LiveOptions {
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const LiveOptions& options);
 
-/// Whether a map could be saved there: known before the flight rather than after it.
-Status check_place_of_map(const std::string& map);
+/// Whether a file could be written there: known before the flight rather than after it.
+/// @param field  in messages
+/// @param file   empty: none is written
+Status check_place(const std::string& field, const std::string& file);
 
 /// Reads the YAML of a session. Errors name file, line and field.
 Result<LiveOptions> read_live_options(const std::filesystem::path& file);
