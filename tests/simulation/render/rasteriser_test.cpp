@@ -1,6 +1,6 @@
 // The rasteriser against rays: both must see the same surface everywhere, but for pixels that lie within
 // rounding of an outline, where a ray beside them must see what was drawn.
-#include "pade/simulation/render/rasteriser.hpp"
+#include "pade/simulation/render/raster/rasteriser.hpp"
 
 #include <cmath>
 #include <cstring>

@@ -31,7 +31,7 @@ std::string row(const Eigen::Vector3d& v) {
 }
 
 /// Raised when the renderer gives other bytes for the same world, so that old frames are not mixed with new.
-constexpr int kRendererRevision = 2;
+constexpr int kRendererRevision = 3;
 
 /// Everything that decides the bytes of the sequence, as text.
 std::string record(const Scene& scene, const Flight& flight, const FlightCamera& camera,

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "pade/core/compute/parallel.hpp"
+#include "pade/simulation/render/sun_map.hpp"
 #include "pade/simulation/render/truth.hpp"
 #include "pade/simulation/world/texture.hpp"
 
@@ -72,6 +74,7 @@ struct Renderer::Implementation {
   std::vector<Paint> paints;
   Eigen::Vector3d to_sun = Eigen::Vector3d::UnitZ();
   Eigen::Array3f sun = Eigen::Array3f::Zero();
+  std::optional<SunMap> sun_map;  ///< where the sun casts shadows
   Eigen::Array3f ambient;
 
   explicit Implementation(const Scene& of);
@@ -86,6 +89,7 @@ Renderer::Implementation::Implementation(const Scene& of) : scene(of) {
   if (world.sun) {
     to_sun = -world.sun->direction.normalized();
     sun = world.sun->colour.cast<float>().array();
+    if (world.sun->casts_shadows) sun_map.emplace(scene.geometry(), to_sun);
   }
   for (const Visual& visual : world.visuals) {
     const Material& material = visual.material;
@@ -181,7 +185,7 @@ class Block {
 
   void take(int left, int top);
   void find_fragments(const RenderOptions& options, const Eigen::Vector3d& to_sun);
-  void trace_shadows(const Eigen::Vector3d& to_sun);
+  void find_shadows(const Eigen::Vector3d& to_sun, const SunMap& sun_map);
 
   [[nodiscard]] bool seen(int lane) const { return seen_[static_cast<std::size_t>(lane)]; }
   [[nodiscard]] const Lane& centre(int lane) const { return centre_[static_cast<std::size_t>(lane)]; }
@@ -274,25 +278,35 @@ void Block::find_fragments(const RenderOptions& options, const Eigen::Vector3d& 
   }
 }
 
-void Block::trace_shadows(const Eigen::Vector3d& to_sun) {
+/// Rays of all samples together, sixteen at a time, where the map leaves it open.
+void Block::find_shadows(const Eigen::Vector3d& to_sun, const SunMap& sun_map) {
+  RayPacket rays{};
+  std::array<Fragment*, kLanes> asks{};
+  int count = 0;
+  const auto trace = [&] {
+    const auto hidden = scene_.occluded(rays, Scene::Blockers::shadow_casters);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      if (hidden[i]) --asks[i]->lit;
+    }
+    rays.active.fill(0);
+    count = 0;
+  };
   for (std::size_t s = 0; s < offsets_.size(); ++s) {
-    RayPacket rays{};
-    bool any = false;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const auto i = static_cast<std::size_t>(lane);
+    for (std::size_t i = 0; i < kLanes; ++i) {
       if (!seen_[i] || fragment_of_[s][i] < 0) continue;
-      const Fragment& fragment = pixels_[i].fragments[static_cast<std::size_t>(fragment_of_[s][i])];
+      Fragment& fragment = pixels_[i].fragments[static_cast<std::size_t>(fragment_of_[s][i])];
       if (fragment.sun_cosine <= 0) continue;
       const Lane& sample = samples_[s][i];
-      rays.set(lane, origin_ + (1 - kLift) * sample.depth * sample.direction, to_sun, 1e-4F, kInfinity);
-      any = true;
-    }
-    if (!any) continue;
-    const auto hidden = scene_.occluded(rays, Scene::Blockers::shadow_casters);
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      if (hidden[i]) --pixels_[i].fragments[static_cast<std::size_t>(fragment_of_[s][i])].lit;
+      const Eigen::Vector3d from = origin_ + (1 - kLift) * sample.depth * sample.direction;
+      const SunMap::Sun sun = sun_map.at(from, fragment.id);
+      if (sun == SunMap::Sun::hidden) --fragment.lit;
+      if (sun != SunMap::Sun::unknown) continue;
+      rays.set(count, from, to_sun, 1e-4F, kInfinity);
+      asks[static_cast<std::size_t>(count)] = &fragment;
+      if (++count == kLanes) trace();
     }
   }
+  if (count > 0) trace();
 }
 
 }  // namespace
@@ -308,7 +322,6 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
   const cv::Size size = grid.camera().size();
   const int samples = std::clamp(options.samples, 1, kMostSamples);
   const std::vector<Eigen::Vector2d> offsets = sample_pattern(samples);
-  const bool shadows = options.shadows && self.scene.world().sun && self.scene.world().sun->casts_shadows;
   const VisibleSurface centres = visible_surface(self.scene, grid, T_world_camera, threads);
   std::vector<VisibleSurface> sampled;
   for (const Eigen::Vector2d& offset : offsets) {
@@ -321,7 +334,7 @@ Rendering Renderer::render(const RayGrid& grid, const Pose& T_world_camera, cons
       size.width, size.height, ray_packet_side, threads, make_block, [&](Block& block, int left, int top) {
         block.take(left, top);
         block.find_fragments(options, self.to_sun);
-        if (shadows) block.trace_shadows(self.to_sun);
+        if (options.shadows && self.sun_map) block.find_shadows(self.to_sun, *self.sun_map);
         for (int lane = 0; lane < kLanes; ++lane) {
           if (!block.seen(lane)) continue;
           const int column = left + lane % ray_packet_side;

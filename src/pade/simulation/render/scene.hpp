@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include "pade/core/result.hpp"
-#include "pade/simulation/render/rasteriser.hpp"
+#include "pade/simulation/render/raster/rasteriser.hpp"
 #include "pade/simulation/world/geometry.hpp"
 #include "pade/simulation/world/world.hpp"
 

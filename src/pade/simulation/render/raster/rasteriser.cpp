@@ -1,4 +1,4 @@
-#include "pade/simulation/render/rasteriser.hpp"
+#include "pade/simulation/render/raster/rasteriser.hpp"
 
 #include <algorithm>
 #include <cmath>

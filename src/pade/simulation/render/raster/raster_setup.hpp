@@ -11,7 +11,7 @@
 #pragma once
 
 #include "pade/core/compute/vec.hpp"
-#include "pade/simulation/render/raster_kernels.hpp"
+#include "pade/simulation/render/raster/raster_kernels.hpp"
 
 namespace pade::simulation::PADE_ISA {
 

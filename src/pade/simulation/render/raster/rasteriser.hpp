@@ -9,7 +9,7 @@
 
 #include "pade/core/camera.hpp"
 #include "pade/core/pose.hpp"
-#include "pade/simulation/render/raster_kernels.hpp"
+#include "pade/simulation/render/raster/raster_kernels.hpp"
 #include "pade/simulation/world/geometry.hpp"
 
 namespace pade::simulation {

@@ -1,7 +1,7 @@
 // Compiled once per instruction set (cmake/PadeCompiler.cmake); every set gives the same bits.
-#include "pade/simulation/render/raster_kernels.hpp"
+#include "pade/simulation/render/raster/raster_kernels.hpp"
 
-#include "pade/simulation/render/raster_setup.hpp"
+#include "pade/simulation/render/raster/raster_setup.hpp"
 
 namespace pade::simulation::PADE_ISA {
 namespace {
