@@ -181,6 +181,15 @@ TEST_F(SdfReader, IsNotStoppedByWhatNobodySees) {
         "</child></joint></model>",
         "<model name='n'><link name='l'><sensor name='s' type='odd'/></link></model>",
         "<light name='q' type='area'/>",
+        "<light name='q' type='point'><pose>0 0 three 0 0 "
+        "0</pose><attenuation><range>far</range></attenuation></light>",
+        "<light name='q' type='spot'><spot><inner_angle>wide</inner_angle></spot></light>",
+        "<model name='n'><link name='a'/><link name='b'/><joint name='j' "
+        "type='revolute'><parent>a</parent><child>b"
+        "</child><axis><xyz>0 0 up</xyz></axis></joint></model>",
+        "<model name='n'><link name='l'><sensor name='s' "
+        "type='ray'><ray><range><max>far</max></range></ray></sensor>"
+        "</link></model>",
         "<actor "
         "name='a'><skin><filename>walk.dae</filename></skin><script><loop>true</loop></script></actor>",
         "<actor name='a'><script><trajectory id='0' type='walk'><waypoint><time>0</time><pose>0 0 0 0 0 "

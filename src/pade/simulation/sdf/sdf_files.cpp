@@ -73,8 +73,9 @@ Status check_version(const fs::path& file, const std::string& text, bool may_be_
   return {};
 }
 
-/// What nobody sees, with all that is inside it.
-constexpr std::array<std::string_view, 24> kUnseen = {"physics",
+/// What nobody sees, with all that is inside it. Joints stay, since frames may hang on them; cameras and IMUs
+/// do.
+constexpr std::array<std::string_view, 40> kUnseen = {"physics",
                                                       "gravity",
                                                       "magnetic_field",
                                                       "atmosphere",
@@ -97,7 +98,23 @@ constexpr std::array<std::string_view, 24> kUnseen = {"physics",
                                                       "visibility_flags",
                                                       "allow_auto_disable",
                                                       "spherical_coordinates",
-                                                      "fog"};
+                                                      "fog",
+                                                      "attenuation",
+                                                      "axis",
+                                                      "axis2",
+                                                      "specular",
+                                                      "altimeter",
+                                                      "magnetometer",
+                                                      "air_pressure",
+                                                      "contact",
+                                                      "force_torque",
+                                                      "gps",
+                                                      "navsat",
+                                                      "lidar",
+                                                      "ray",
+                                                      "logical_camera",
+                                                      "sonar",
+                                                      "transceiver"};
 
 /// The end of the element whose tag begins at `open`, behind its closing tag; npos where it is not closed.
 std::size_t end_of_element(const std::string& text, const std::string& tag, std::size_t open) {
@@ -116,6 +133,33 @@ std::size_t end_of_element(const std::string& text, const std::string& tag, std:
     if (depth <= 0) return close + 1;
   }
   return std::string::npos;
+}
+
+void blank(std::string& text, std::size_t from, std::size_t to) {
+  for (std::size_t i = from; i < to; ++i) {
+    if (text[i] != '\n') text[i] = ' ';
+  }
+}
+
+/// Of lights that are no sun nothing is drawn, but they are named: all of them become points, without
+/// contents.
+void empty_lamps(std::string& text) {
+  static const std::regex lamp(R"re(<light\s[^>]*type\s*=\s*["'](point|spot)["'][^>]*>)re");
+  std::smatch found;
+  std::size_t from = 0;
+  while (std::regex_search(text.cbegin() + static_cast<std::ptrdiff_t>(from), text.cend(), found, lamp)) {
+    const std::size_t open = from + static_cast<std::size_t>(found.position(0));
+    const std::size_t inside = open + static_cast<std::size_t>(found.length(0));
+    const std::size_t type = from + static_cast<std::size_t>(found.position(1));
+    const bool empty = text[inside - 2] == '/';
+    const std::size_t end = empty ? std::string::npos : text.find("</light>", inside);
+    from = inside;
+    if (end != std::string::npos) blank(text, inside, end);
+    if (text.compare(type, 4, "spot") == 0) {
+      text.replace(type, 4, "point");
+      ++from;
+    }
+  }
 }
 
 Status check(const fs::path& file, const ResourcePaths& resources, std::vector<fs::path>& open) {
@@ -198,6 +242,7 @@ std::optional<fs::path> model_file(const fs::path& path) {
 
 std::string without_unseen(std::string text) {
   text = without_comments(std::move(text));
+  empty_lamps(text);
   for (const std::string_view name : kUnseen) {
     const std::string tag(name);
     std::size_t open = text.find("<" + tag);
@@ -206,9 +251,7 @@ std::string without_unseen(std::string text) {
       const bool whole =
           after < text.size() && std::string_view(" \t\r\n/>").find(text[after]) != std::string::npos;
       const std::size_t end = whole ? end_of_element(text, tag, open) : std::string::npos;
-      for (std::size_t i = open; end != std::string::npos && i < end; ++i) {
-        if (text[i] != '\n') text[i] = ' ';
-      }
+      if (end != std::string::npos) blank(text, open, end);
       open = text.find("<" + tag, open + 1);
     }
   }
