@@ -49,7 +49,7 @@ bool write_text(Port& port, const std::string& text) {
   return port.write(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
-TEST(UdpPort, AnswersWhoeverSentLast) {
+TEST(UdpPort, AnswersTheSenderThatIsChosenAndNobodyElse) {
   const auto port = open_udp(kPort);
   ASSERT_TRUE(port) << port.error().message;
   EXPECT_FALSE(write_text(**port, "nobody"));
@@ -58,6 +58,11 @@ TEST(UdpPort, AnswersWhoeverSentLast) {
     const sockaddr_in to = loopback(kPort);
     ASSERT_EQ(::sendto(socket, "hello", 5, 0, reinterpret_cast<const sockaddr*>(&to), sizeof(to)), 5);
     EXPECT_EQ(heard(**port), "hello");
+    (*port)->answer_sender();
+    const int stranger = ::socket(AF_INET, SOCK_DGRAM, 0);
+    ASSERT_EQ(::sendto(stranger, "me", 2, 0, reinterpret_cast<const sockaddr*>(&to), sizeof(to)), 2);
+    EXPECT_EQ(heard(**port), "me");
+    ::close(stranger);
     EXPECT_TRUE(write_text(**port, "answer"));
     char answer[10] = {};
     EXPECT_EQ(::recv(socket, answer, sizeof(answer), 0), 6);

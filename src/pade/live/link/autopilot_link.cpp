@@ -78,11 +78,13 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     if (!same)
       report_.autopilot = Autopilot{frame.system, frame.component, heartbeat->autopilot, heartbeat->type};
     heard_ = now;
+    port_->answer_sender();
     sender_.system = frame.system;  // PX4 drops what another system sends
     return;
   }
   const auto& autopilot = report_.autopilot;
   if (!autopilot || frame.system != autopilot->system || frame.component != autopilot->component) return;
+  port_->answer_sender();
   if (frame.id == mavlink::Timesync::kId) return take_timesync(frame, now);
   if (const auto ack = mavlink::unpack<mavlink::CommandAck>(frame)) {
     constexpr std::uint8_t kInProgress = 5;

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <netinet/in.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <termios.h>
 #include <unistd.h>
@@ -49,14 +50,14 @@ class UdpPort : public Port {
 
   void wait(int milliseconds) override { wait_for_bytes(socket_, milliseconds); }
   std::size_t read(std::span<std::uint8_t> bytes) override {
-    sockaddr_in from{};
-    socklen_t length = sizeof(from);
+    socklen_t length = sizeof(sender_);
     const ssize_t count = ::recvfrom(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT,
-                                     reinterpret_cast<sockaddr*>(&from), &length);
-    if (count <= 0) return 0;
-    peer_ = from;
+                                     reinterpret_cast<sockaddr*>(&sender_), &length);
+    return count > 0 ? static_cast<std::size_t>(count) : 0;
+  }
+  void answer_sender() override {
+    peer_ = sender_;
     known_ = true;
-    return static_cast<std::size_t>(count);
   }
   bool write(std::span<const std::uint8_t> bytes) override {
     if (!known_) return false;
@@ -67,6 +68,7 @@ class UdpPort : public Port {
 
  private:
   Descriptor socket_;
+  sockaddr_in sender_{};  // of what was read last
   sockaddr_in peer_{};
   bool known_ = false;
 };
@@ -83,7 +85,9 @@ constexpr Speed kSpeeds[] = {{9600, B9600},       {19200, B19200},     {38400, B
 Descriptor open_line(const std::string& device, speed_t speed) {
   Descriptor line(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   termios settings{};
-  if (!line.open() || ::tcgetattr(line.get(), &settings) != 0) return Descriptor();
+  // Two programs on one line would each get half of the bytes.
+  if (!line.open() || ::tcgetattr(line.get(), &settings) != 0 || ::ioctl(line.get(), TIOCEXCL) != 0)
+    return Descriptor();
   ::cfmakeraw(&settings);
   settings.c_cflag |= CLOCAL | CREAD;
   settings.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB);

@@ -23,15 +23,17 @@ class Port {
   virtual void wait(int milliseconds) = 0;
   /// What has come, as much as fits; 0 if nothing has. A line that was closed is opened again here.
   virtual std::size_t read(std::span<std::uint8_t> bytes) = 0;
+  /// What read() gave last came from the one who gets what is written from now on, where several may send.
+  virtual void answer_sender() {}
   /// False if the bytes could not be sent, now or at all.
   virtual bool write(std::span<const std::uint8_t> bytes) = 0;
 };
 
-/// Listens at a UDP port and sends to whoever sent last; before that nothing can be sent. Error: the port is
-/// taken.
+/// Listens at a UDP port, to anybody, and sends to whom answer_sender() chose last (whose address may change
+/// at any time); before that nothing can be sent. Error: the port is taken.
 Result<std::unique_ptr<Port>> open_udp(int port);
 /// A serial line, 8 bits without parity. Closed (the cable pulled out), it is tried anew twice a second.
-/// Error: it cannot be opened, or it has no such speed.
+/// While it is open no other program opens it. Error: it cannot be opened, or it has no such speed.
 Result<std::unique_ptr<Port>> open_serial(const std::string& device, int baud);
 /// "udp:14540", or a device such as "/dev/ttyAMA0". Errors: those above; neither of the two.
 Result<std::unique_ptr<Port>> open_port(const std::string& name, int baud);
