@@ -221,6 +221,21 @@ TEST(PlanarFilter, ForgetsItsYawInALongGapAndFindsItAgain) {
   EXPECT_LT(off(car, filter), 8);
 }
 
+TEST(PlanarFilter, AMinuteWithoutOdometryEndsIt) {
+  Drive car(2);
+  PlanarFilter filter(PlanarOptions{});
+  drive(car, filter, 20);
+  PlanarOdometry held = car.go();
+  for (int i = 0; i < 310; ++i) car.go();
+  filter.propagate(car.stamp(), held);
+  EXPECT_FALSE(filter.started());
+  EXPECT_EQ(filter.tally().gaps, 1U);
+  const auto counted = filter.tally().counted;
+  drive(car, filter, 60);
+  EXPECT_GT(filter.tally().counted, counted + 1000);
+  EXPECT_LT(off(car, filter), 8);
+}
+
 TEST(PlanarFilter, ReflectedRangesAreDoubtedAndDoLittleHarm) {
   const auto error = [](double doubt, double late_share) {
     double sum = 0;

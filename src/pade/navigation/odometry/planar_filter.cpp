@@ -20,6 +20,7 @@ constexpr double kStartSigma = 100;       // of the position that a start is giv
 constexpr double kStartClockSigma = 100;  // of a clock taken from a median of ranges, m
 constexpr double kStartDriftSigma = 300;  // of its drift: 1 ppm, m/s
 constexpr double kStartSystemSigma = 50;  // of a system's bias, taken likewise, m
+constexpr double kPause = 60;  // s without odometry, after which nothing of the motion is known any more
 constexpr double kFirstInterval = 1;  // s: the first epoch, which no other checks, is not all that is known
 constexpr int kRounds = 4;            // of weighing: more move the estimate by centimetres
 constexpr double kYawLost = 2.5;      // times `yaw_known`: beyond it the yaw is not known any more
@@ -56,7 +57,12 @@ Status check(const PlanarOptions& o) {
 }
 
 void PlanarFilter::start(Time time, const Vector3d& position) {
+  const PlanarTally tally = tally_;
+  const std::optional<Time> last_epoch = last_epoch_, gap = gap_since_;
   *this = PlanarFilter(options_);
+  tally_ = tally;
+  last_epoch_ = last_epoch;
+  gap_since_ = gap;
   started_ = true;
   time_ = agreed_ = time;
   position_ = position;
@@ -95,6 +101,15 @@ void PlanarFilter::turn_noise(double variance) {
 void PlanarFilter::propagate(Time to, const PlanarOdometry& mean) {
   const double T = seconds_between(time_, to);
   if (!started_ || !(T > 0)) return;
+  const double until = seconds_between(mean.time, to);
+  if (until > options_.gap && gap_since_ != mean.time) {
+    ++tally_.gaps;
+    gap_since_ = mean.time;
+  }
+  if (until > kPause) {
+    started_ = false;
+    return;
+  }
   const Vector2d way = T * mean.speed * direction(turned_ + 0.5 * mean.yaw_rate * T);
   const Matrix2d back = turned_by(-bias_ * T);
   PlanarMatrix F = PlanarMatrix::Identity();
@@ -114,12 +129,9 @@ void PlanarFilter::propagate(Time to, const PlanarOdometry& mean) {
   double turn = options_.yaw_noise * options_.yaw_noise * T + std::pow(mean.yaw_rate_sigma * T, 2) +
                 options_.turn_noise * options_.turn_noise * std::abs(mean.yaw_rate) * T;
   // Within a gap the speed runs away: the same noise in one step as in many.
-  const double until = seconds_between(mean.time, to);
   const double since = std::max(options_.gap, until - T);
   double unseen = 0;
   if (until > options_.gap) {
-    if (gap_since_ != mean.time) ++tally_.gaps;
-    gap_since_ = mean.time;
     unseen = std::pow(0.5 * options_.gap_acceleration, 2) * (std::pow(until, 4) - std::pow(since, 4));
     turn += options_.gap_yaw_rate * options_.gap_yaw_rate * (until * until - since * since);
   }

@@ -64,12 +64,13 @@ class PlanarFilter {
  public:
   explicit PlanarFilter(const PlanarOptions& options) : options_(options) {}
 
-  /// Starts at rest, with nothing known but roughly a position.
+  /// Starts at rest, with nothing known but roughly a position; counts go on.
   /// @param position  ENU, m; taken as known to 100 m
   void start(Time time, const Vector3d& position);
   [[nodiscard]] bool started() const { return started_; }
 
   /// Moves on with the mean of the odometry over the interval. Times that do not lie ahead are passed over.
+  /// After a minute without odometry the filter has to be started again.
   /// @param mean  its time is that of the last sample: the longer ago, the less it says
   /// (`PlanarOptions::gap`)
   void propagate(Time to, const PlanarOdometry& mean);

@@ -46,13 +46,16 @@ PlanarRun run_planar(const gnss::RawLog& log, const gnss::PositioningOptions& po
       ++run.outside;
       continue;
     }
+    mover.move(filter, epoch.time);
     const auto raw = observer.observe(epoch);
     if (!raw || (!filter.started() && !raw->fix)) {
       ++run.before_start;
       continue;
     }
-    if (!filter.started()) filter.start(epoch.time, raw->fix->position);
-    mover.move(filter, epoch.time);
+    if (!filter.started()) {
+      filter.start(epoch.time, raw->fix->position);
+      ++run.starts;
+    }
     PlanarFrame frame;
     if (coupling == PlanarCoupling::tight) {
       frame.shares = filter.update(*raw);

@@ -28,7 +28,8 @@ struct PlanarRun {
   std::vector<PlanarFrame> frames;  ///< of each epoch from the first position on, causal
   std::optional<LocalFrame> place;  ///< of east, north and up; empty without any position
   PlanarTally tally;
-  std::size_t before_start = 0;      ///< epochs before a first position
+  std::size_t before_start = 0;      ///< epochs before a position to start from
+  std::size_t starts = 0;            ///< one, and one for each epoch a minute behind the last odometry
   std::size_t without_position = 0;  ///< loose: epochs that gave none and so nothing
   std::size_t outside = 0;           ///< epochs before the first or a gap behind the last odometry: not used
   std::optional<Time> yaw_found;     ///< when the yaw was known first
