@@ -112,6 +112,16 @@ TEST(RawGnssCommand, PlaysRangesWithOdometryAndNoImu) {
   }
 }
 
+TEST(RawGnssCommand, RefusesOptionsOfRawGnssWhereThereIsNone) {
+  const test::TemporaryFolder folder;
+  for (const std::string option : {"--raw-gnss x", "--elevation-mask 5"}) {
+    const auto run = test::shell(test::kPade + " navigate " + folder.path().string() + " --out " +
+                                 (folder / "out").string() + " " + option);
+    EXPECT_EQ(run.code, 1);
+    EXPECT_THAT(run.text, HasSubstr("found it without --raw-coupling"));
+  }
+}
+
 TEST(RawGnssCommand, RefusesWhatWouldDoNothing) {
   const test::TemporaryFolder folder;
   const auto street = (folder / "street.txt").string();

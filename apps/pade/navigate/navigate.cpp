@@ -238,6 +238,12 @@ Status navigate(const NavigateArguments& arguments) {
     return navigate_raw(
         {arguments.log, arguments.out, positioning_options(arguments), arguments.force, arguments.json});
   }
+  for (const char* option : {"--raw-gnss", "--elevation-mask"}) {
+    if (arguments.raw_coupling.empty() && arguments.command->get_option(option)->count() > 0) {
+      return Error{fmt::format(
+          "{}: found it without --raw-coupling, expected both: alone it would do nothing", option)};
+    }
+  }
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kMarker);
   if (!output) return output.error();

@@ -50,7 +50,9 @@ std::vector<std::string> remarks_of(const gnss::RawLog& log, const PlanarRun& ru
     if (count > 0) remarks.push_back(fmt::format("{} {}", count, what));
   };
   say(run.outside, "epochs lie outside of the odometry and are not used");
-  say(run.before_start, "epochs lie before the first position and are not used");
+  say(run.before_start, "epochs lie before a position to start from and are not used");
+  if (run.starts > 1)
+    say(run.starts, "starts: a minute behind the last odometry nothing is known of the motion");
   say(run.without_position, "epochs give no position alone and are not used (loose)");
   say(run.tally.untimely, "epochs repeat a time or go back and are not used");
   say(run.tally.gaps, "gaps in the odometry, in which the position is held by the satellites alone");
