@@ -181,7 +181,13 @@ TEST(PlanarFilter, ATurnByAnUnknownAngleIsThatOfManyTurns) {
       (filter.covariance().block<2, 2>(kPlanarHeading, kPlanarHeading) - (squares - sum * sum.transpose()))
           .norm(),
       0.01);
-  EXPECT_TRUE((filter.covariance().topLeftCorner<3, 3>() - before.topLeftCorner<3, 3>()).norm() < 1e-3);
+  const PlanarMatrix after = filter.covariance();
+  EXPECT_LT((after.topLeftCorner<3, 3>() - before.topLeftCorner<3, 3>()).norm(), 1e-3);
+  EXPECT_LT((after - after.transpose()).norm(), 1e-9);
+  // What heading and position have in common is turned away with the heading's mean.
+  const Eigen::Matrix<double, 3, 2> common = before.block<3, 2>(0, kPlanarHeading);
+  const Eigen::Matrix<double, 3, 2> left = after.block<3, 2>(0, kPlanarHeading);
+  EXPECT_LT((left - std::exp(-0.5 * 0.49) * common).norm(), 0.02 * common.norm());
 }
 
 TEST(PlanarFilter, AGapIsAsLongInOneStepAsInMany) {
@@ -202,6 +208,27 @@ TEST(PlanarFilter, AGapIsAsLongInOneStepAsInMany) {
   EXPECT_LT((a.position - b.position).norm(), 20);
   EXPECT_NEAR(a.covariance(0, 0) / b.covariance(0, 0), 1, 0.4);
   EXPECT_NEAR(a.yaw_sigma / b.yaw_sigma, 1, 0.05);
+}
+
+TEST(PlanarFilter, AGapBeginsWithoutAJump) {
+  const auto variance_after = [](double seconds) {
+    Drive car(2);
+    PlanarFilter filter(white());
+    drive(car, filter, 40);
+    filter.propagate(Time::from_seconds(car.time() + seconds), {car.stamp(), 5, 0, 0, 0});
+    return filter.estimate().covariance(0, 0);
+  };
+  EXPECT_LT(variance_after(1.01) - variance_after(0.99), 0.3);
+}
+
+TEST(PlanarFilter, KnowsTheWheelsAsSoonAsItsYaw) {
+  Drive car(1);
+  PlanarFilter filter(PlanarOptions{});
+  while (!filter.estimate().yaw_known && car.time() < 60) drive(car, filter, 0.2);
+  const PlanarEstimate now = filter.estimate();
+  ASSERT_TRUE(now.yaw_known);
+  EXPECT_LT(now.scale_sigma, 0.021);
+  EXPECT_NEAR(now.scale, 1, 0.03);
 }
 
 TEST(PlanarFilter, ForgetsItsYawInALongGapAndFindsItAgain) {
