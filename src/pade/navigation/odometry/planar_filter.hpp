@@ -97,7 +97,7 @@ class PlanarFilter {
   void follow_clock_jump(const RawEpoch& epoch);
   /// Opens position and clock for the satellites, if most of them have contradicted for long enough.
   void believe_again(const RawEpoch& epoch);
-  [[nodiscard]] double share_of(double residual_in_sigmas) const;
+  [[nodiscard]] double share_of(double u) const;  ///< of a residual in sigmas
   /// By how much variances are enlarged because errors last.
   double lasting(Time time);
   void apply(const PlanarVector& error);
