@@ -22,10 +22,11 @@
 #include "pade/live/recordings/ulog.hpp"
 #include "pade/navigation/navigation_run.hpp"
 #include "pade/pipeline/checked_log.hpp"
+#include "pade/report/gnss/raw_gnss_report.hpp"
 #include "pade/report/navigation_report.hpp"
-#include "pade/report/raw_gnss_report.hpp"
 
 #include "commands.hpp"
+#include "odometry.hpp"
 #include "raw_gnss.hpp"
 #include "tight.hpp"
 
@@ -60,7 +61,21 @@ struct NavigateArguments {
   double elevation_mask = 10;
   bool force = false;
   bool json = false;
+  const CLI::App* command = nullptr;
 };
+
+/// Refuses options that were given and mean nothing here.
+Status refuse_unused(const NavigateArguments& arguments, const std::vector<std::string>& used,
+                     const char* why) {
+  for (const CLI::Option* option : arguments.command->get_options()) {
+    if (option->count() == 0 || option->get_positional()) continue;
+    const std::string name = option->get_name();
+    if (std::find(used.begin(), used.end(), name) != used.end()) continue;
+    return Error{
+        fmt::format("{}: found it with {}, expected that it is left out: it would do nothing", name, why)};
+  }
+  return {};
+}
 
 /// Lever arm, and what a calibration says of where the camera sits.
 Status set_mounting(const NavigateArguments& arguments, NavigationRunOptions& options) {
@@ -195,9 +210,39 @@ Result<CheckedLog> read_log(const NavigateArguments& arguments) {
 }
 
 Status navigate(const NavigateArguments& arguments) {
+  if (!arguments.raw_coupling.empty() && arguments.raw_gnss.empty() && !arguments.raw &&
+      is_known_ranges(arguments.log)) {
+    const Status fits =
+        refuse_unused(arguments, {"--out", "--raw-coupling", "--elevation-mask", "--force", "--json"},
+                      "odometry and no IMU");
+    if (!fits) return fits;
+    OdometryArguments odometry;
+    odometry.log = arguments.log;
+    odometry.out = arguments.out;
+    if (arguments.raw_coupling == "loose") odometry.coupling = navigation::PlanarCoupling::loose;
+    odometry.positioning = positioning_options(arguments);
+    odometry.force = arguments.force;
+    odometry.json = arguments.json;
+    if (const auto beside = read_log(arguments); beside && !beside->log.imu.empty()) {
+      odometry.remarks.push_back(
+          fmt::format("the {} samples of the IMU beside them are not used: the ranges have no "
+                      "Doppler",
+                      beside->log.imu.size()));
+    }
+    return navigate_odometry(odometry);
+  }
   if (arguments.raw || is_raw_gnss_file(arguments.log)) {
+    const Status fits = refuse_unused(arguments, {"--out", "--raw", "--elevation-mask", "--force", "--json"},
+                                      "raw GNSS alone, without an IMU");
+    if (!fits) return fits;
     return navigate_raw(
         {arguments.log, arguments.out, positioning_options(arguments), arguments.force, arguments.json});
+  }
+  for (const char* option : {"--raw-gnss", "--elevation-mask"}) {
+    if (arguments.raw_coupling.empty() && arguments.command->get_option(option)->count() > 0) {
+      return Error{fmt::format(
+          "{}: found it without --raw-coupling, expected both: alone it would do nothing", option)};
+    }
   }
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kMarker);
@@ -206,6 +251,13 @@ Status navigate(const NavigateArguments& arguments) {
   if (!checked) return checked.error();
   const auto raw = take_raw_gnss(arguments, checked->log);
   if (!raw) return raw.error();
+  gnss::RawRun alone;  // each epoch by itself, for the page that shows residuals and slips
+  if (*raw) {
+    alone = gnss::run_raw((*raw)->log, positioning_options(arguments));
+    for (std::string& sentence : gnss::unusable_satellites(alone)) {
+      checked->log.remarks.push_back(std::move(sentence));
+    }
+  }
   const NavigationLog* const log = &checked->log;
   auto options = run_options(arguments, *log);
   if (!options) return options.error();
@@ -218,19 +270,20 @@ Status navigate(const NavigateArguments& arguments) {
   json["remarks"] = log->remarks;
   if (*raw) {
     json["raw_gnss"] = json_of(run.raw);
-    const gnss::RawRun alone = gnss::run_raw((*raw)->log, positioning_options(arguments));
     for (const auto& [file, content] :
          {std::pair<std::string, std::string>{"residuals.csv", format_residuals(alone)},
           {"raw_report.html", raw_report("Raw GNSS alone, epoch by epoch", (*raw)->log, alone, {})}}) {
       if (Status written = output->write(file, content); !written) return written;
     }
   }
+  std::string slips = slip_plot(run);  // as the filter found them; a loose one looks at no phase
+  if (slips.empty() && *raw) slips = slip_plot(alone);
   const std::string title = "Navigation of " + std::filesystem::path(arguments.log).filename().string();
   for (const auto& [file, content] :
        {std::pair<std::string, std::string>{"trajectory.txt", format_trajectory(run)},
         {kMarker, format_relative_motion(run)},
         {"navigation.json", json.dump(2) + "\n"},
-        {"report.html", navigation_report(title, *log, run, score)}}) {
+        {"report.html", navigation_report(title, *log, run, score, slips)}}) {
     if (Status written = output->write(file, content); !written) return written;
   }
   if (Status committed = output->commit(); !committed) return committed;
@@ -273,6 +326,7 @@ Status navigate(const NavigateArguments& arguments) {
 void add_navigate(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("navigate", "Trajectory and frame-to-frame motion from IMU and GNSS");
   auto arguments = std::make_shared<NavigateArguments>();
+  arguments->command = command;
   command
       ->add_option("log", arguments->log,
                    "Folder with imu.csv and gnss.csv, EuRoC, a VectorNav export, a ground station's .tlog, "
@@ -343,7 +397,9 @@ void add_navigate(CLI::App& app, Context& context) {
       ->add_option("--raw-coupling", arguments->raw_coupling,
                    "Raw GNSS beside the IMU in place of gnss.csv: tight, each satellite for itself "
                    "(docs/navigation.md, "
-                   "section 7), or loose, the positions and velocities that come of each epoch")
+                   "section 7), or loose, the positions and velocities that come of each epoch; of libRSF "
+                   "ranges beside "
+                   "their odometry (section 8)")
       ->check(CLI::IsMember({"loose", "tight"}));
   command->add_option("--raw-gnss", arguments->raw_gnss,
                       "Where that raw GNSS is, if not in the folder of the log");

@@ -14,7 +14,7 @@
 #include "pade/io/gnss/raw_gnss_files.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/navigation/gnss/raw_run.hpp"
-#include "pade/report/raw_gnss_report.hpp"
+#include "pade/report/gnss/raw_gnss_report.hpp"
 
 namespace pade::cli {
 namespace {
@@ -45,7 +45,9 @@ nlohmann::ordered_json raw_json(const gnss::RawLog& log, const gnss::RawRun& run
   }
   if (score) {
     json["against_truth"] = {{"epochs", score->epochs},
+                             {"horizontal_median_m", score->horizontal_median},
                              {"horizontal_rms_m", score->horizontal_rms},
+                             {"horizontal_95_m", score->horizontal_95},
                              {"vertical_rms_m", score->vertical_rms}};
   }
   json["options"] = json_of_options(options);
@@ -71,8 +73,11 @@ void print_summary(const gnss::RawLog& log, const gnss::RawRun& run, const std::
   }
   fmt::print("satellites: {}\n", uses);
   if (score) {
-    fmt::print("against truth, rms: horizontal {:.2f} m, vertical {:.2f} m ({} epochs)\n",
-               score->horizontal_rms, score->vertical_rms, score->epochs);
+    fmt::print(
+        "against truth: horizontal {:.2f} m median, {:.2f} m rms, {:.2f} m 95 %; vertical {:.2f} m rms ({} "
+        "epochs)\n",
+        score->horizontal_median, score->horizontal_rms, score->horizontal_95, score->vertical_rms,
+        score->epochs);
   }
 }
 
@@ -103,9 +108,14 @@ Status navigate_raw(const RawGnssArguments& arguments) {
   const auto overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
   auto output = io::OutputFolder::create(arguments.out, overwrite, kRawMarker);
   if (!output) return output.error();
-  const auto log = io::read_raw_gnss(arguments.log);
+  auto log = io::read_raw_gnss(arguments.log);
   if (!log) return log.error();
+  if (!log->odometry.empty()) {
+    log->remarks.push_back(fmt::format("{} samples of odometry are not used; --raw-coupling tight uses them",
+                                       log->odometry.size()));
+  }
   const gnss::RawRun run = gnss::run_raw(*log, arguments.options);
+  for (std::string& sentence : gnss::unusable_satellites(run)) log->remarks.push_back(std::move(sentence));
   const auto fixes = gnss_log_of(run);
   if (!fixes) {
     return Error{fmt::format(

@@ -47,6 +47,8 @@ struct Innovation {
   Vector3d white = Vector3d::Zero();     ///< the residual in units of its predicted covariance, S^(-1/2) r
   double chi_square = 0;      ///< squared Mahalanobis length of the residual: the gate is a bound on it
   double log_likelihood = 0;  ///< of the residual under its predicted covariance, without the constant
+  std::uint64_t refused_ranges = 0;  ///< of raw GNSS: bit i is satellite i of the epoch
+  std::uint64_t refused_phases = 0;  ///< likewise, where the phase went on since the anchor but did not fit
   double jump = 0;  ///< distance the position (or speed the velocity) moved in a re-acquisition, m or m/s
 };
 

@@ -168,7 +168,8 @@ std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
 }
 
 std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run,
-                              const std::optional<evaluation::MotionSummary>& score) {
+                              const std::optional<evaluation::MotionSummary>& score,
+                              const std::string& figures) {
   std::string html = fmt::format(
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}"
       "svg.plot {{ width: 100%; max-width: 860px; display: block; background: #fff; "
@@ -190,6 +191,7 @@ std::string navigation_report(const std::string& title, const NavigationLog& log
   html += innovation_plot(run, navigation::SensorKind::gnss_position, "GNSS position", "m");
   html +=
       innovation_plot(run, navigation::SensorKind::raw_gnss, "Velocity from the Doppler of raw GNSS", "m/s");
+  html += figures;
   return html + "</main></body></html>\n";
 }
 

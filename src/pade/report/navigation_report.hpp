@@ -22,8 +22,9 @@ std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
                                                        const NavigationRunOptions& options,
                                                        const NavigationRun& run);
 
-/// `title`: what was played. `score`: that of score_motions().
+/// `title`: what was played. `score`: that of score_motions(). `figures`: more of them, as HTML.
 std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run,
-                              const std::optional<evaluation::MotionSummary>& score);
+                              const std::optional<evaluation::MotionSummary>& score,
+                              const std::string& figures = {});
 
 }  // namespace pade

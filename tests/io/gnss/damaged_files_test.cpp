@@ -9,6 +9,7 @@
 #include "pade/io/gnss/raw_gnss_files.hpp"
 #include "pade/io/text.hpp"
 #include "pade/navigation/gnss/raw_run.hpp"
+#include "pade/navigation/odometry/planar_run.hpp"
 
 namespace pade::io {
 namespace {
@@ -69,6 +70,14 @@ void expect_finite(const gnss::RawLog& log) {
     EXPECT_TRUE(!epoch.velocity || epoch.velocity->velocity.allFinite());
     EXPECT_TRUE(!epoch.step || epoch.step->step.allFinite());
   }
+  using navigation::PlanarCoupling;
+  for (const auto coupling : {PlanarCoupling::tight, PlanarCoupling::loose}) {
+    for (const auto& frame : navigation::run_planar(log, {}, {}, coupling).frames) {
+      EXPECT_TRUE(frame.estimate.position.allFinite());
+      EXPECT_GE(frame.estimate.covariance.diagonal().minCoeff(), 0);
+      EXPECT_TRUE(std::isfinite(frame.estimate.yaw_sigma));
+    }
+  }
 }
 
 TEST(DamagedRawGnss, IsRefusedOrPlayed) {
@@ -78,7 +87,8 @@ TEST(DamagedRawGnss, IsRefusedOrPlayed) {
       kReaders{{"raw_observations/epochs.obs", parse_rinex_observations},
                {"raw_observations/events.obs", parse_rinex_observations},
                {"raw_navigation/mixed.nav", parse_rinex_navigation},
-               {"raw_known_ranges/street.txt", parse_known_ranges}};
+               {"raw_known_ranges/street.txt", parse_known_ranges},
+               {"raw_known_ranges/drive.txt", parse_known_ranges}};
   std::mt19937 random(1);
   for (const auto& [file, parse] : kReaders) {
     const auto whole = read_file(corpus / file);

@@ -88,6 +88,21 @@ TEST(RinexObservations, TurnsOtherTimeSystemsIntoGps) {
   EXPECT_THAT(refused(obs_header("3.04", "XYZ") + epoch_line(42, 1) + kG8), HasSubstr("time system \"XYZ\""));
 }
 
+TEST(RinexObservations, ALeapSecondIsASecond) {
+  std::string text = obs_header("3.04", "GLO");
+  for (const char* stamp : {"2016 12 31 23 59 59.0000000", "2016 12 31 23 59 60.0000000",
+                            "2017  1  1  0  0  0.0000000", "2017  1  1  0  0  1.0000000"}) {
+    text += std::string("> ") + stamp + "  0  1\n" + kG8;
+  }
+  const auto log = parsed(text);
+  ASSERT_EQ(log.epochs.size(), 4U);
+  EXPECT_TRUE(log.remarks.empty());
+  for (int i = 0; i < 4; ++i) {
+    const std::int64_t midnight = time_of_date(2017, 1, 1, 0, 0, 0)->nanoseconds;
+    EXPECT_EQ(log.epochs[static_cast<std::size_t>(i)].time.nanoseconds, midnight + (16 + i) * kSecond) << i;
+  }
+}
+
 TEST(RinexObservations, NamesAndSurvivesRepeatedAndBackwardEpochs) {
   const auto log = parsed(obs_header() + epoch_line(42, 1) + kG8 + epoch_line(42, 1) + kG10 +
                           epoch_line(41, 1) + kG10 + epoch_line(43, 1) + kG8);
@@ -269,8 +284,31 @@ TEST(KnownRanges, AreReadWithTheTruth) {
   EXPECT_EQ(log.truth.size(), 1U);
   ASSERT_EQ(log.remarks.size(), 1U);
   EXPECT_THAT(log.remarks[0], HasSubstr("a.txt: line 4"));
+  ASSERT_EQ(log.odometry.size(), 1U);
+  EXPECT_DOUBLE_EQ(log.odometry[0].speed, 5.85);
+  EXPECT_DOUBLE_EQ(log.odometry[0].yaw_rate, -0.006);
+  EXPECT_DOUBLE_EQ(log.odometry[0].speed_sigma, 0.05);
+  EXPECT_DOUBLE_EQ(log.odometry[0].yaw_rate_sigma, 0.002);
   gnss::RawLog none;
   EXPECT_FALSE(parse_known_ranges("odom3 0 1 2 3\n", "a.txt", none));
+}
+
+TEST(KnownRanges, OdometryThatNoCarHasIsNamedAndLeftOut) {
+  const std::string tail = " 0.0025 0.0009 0.0009 4e-06 4e-06 4e-06\n";
+  std::string text;
+  for (int i = 0; i < 6; ++i) text += "odom3 " + std::to_string(i) + " 5 0 0 0 0 0.1" + tail;
+  for (const char* bad : {"odom3 5 5 0 0 0 0 0.1", "odom3 4 5 0 0 0 0 0.1", "odom3 7 nan 0 0 0 0 0.1",
+                          "odom3 7 5000 0 0 0 0 0.1", "odom3 7 5 0 0 0 0 1e9"}) {
+    gnss::RawLog log;
+    ASSERT_TRUE(parse_known_ranges(text + bad + tail, "a.txt", log)) << bad;
+    EXPECT_EQ(log.odometry.size(), 6U) << bad;
+    ASSERT_EQ(log.remarks.size(), 1U) << bad;
+    EXPECT_THAT(log.remarks[0], HasSubstr("a.txt: line 7"));
+    EXPECT_THAT(log.remarks[0], HasSubstr("expected odom3, time, velocity x y z"));
+  }
+  gnss::RawLog log;
+  ASSERT_TRUE(parse_known_ranges(text + "odom3 7 5 0 0 0 0 0.1 0 1 1 1 1 1\n", "a.txt", log));
+  EXPECT_EQ(log.odometry.size(), 6U) << "a variance of zero";
 }
 
 TEST(RawGnssFolder, FindsItsFilesByTheirFirstLines) {

@@ -72,6 +72,10 @@ TEST_F(RawRecording, StaticReceiverStandsStill) {
   // E31 has no ephemeris in any epoch; G22 and E14 are unhealthy.
   EXPECT_EQ(run.uses[static_cast<std::size_t>(Use::no_ephemeris)], 610U);
   EXPECT_GT(run.uses[static_cast<std::size_t>(Use::unhealthy)], 0U);
+  const auto unusable = unusable_satellites(run);
+  ASSERT_EQ(unusable.size(), 2U);
+  EXPECT_EQ(unusable[0], "no ephemeris: E31 (610 epochs)");
+  EXPECT_EQ(unusable[1].substr(0, 11), "unhealthy: ");
   double speed = 0, predicted = 0;
   std::vector<double> steps;
   for (const EpochResult& e : run.epochs) {

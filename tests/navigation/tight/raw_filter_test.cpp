@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "pade/evaluation/navigation_score.hpp"
+#include "pade/navigation/gnss/raw_run.hpp"
 #include "pade/navigation/replay.hpp"
 #include "pade/navigation/tight/raw_observer.hpp"
 #include "pade/simulation/flight/sensors/raw_gnss.hpp"
@@ -227,6 +228,71 @@ TEST_F(RawFilter, EpochsWithoutUseAreSurvived) {
   const auto outcome = fly(epochs);
   EXPECT_LT(outcome.velocity_rms, 0.1);
   EXPECT_LT(outcome.position_rms, 2);
+}
+
+TEST_F(RawFilter, SatellitesWithoutAUsableEphemerisAreMissedAndNotBelieved) {
+  const auto epochs = measured({});
+  const auto all = prepared(epochs);
+  std::vector<gnss::SatelliteId> unusable;
+  for (std::size_t i = 0; i < 3; ++i) unusable.push_back(all.front()->satellites.at(i).satellite);
+  // The first has none, that of the second is unhealthy, of the third too old; that these two are wrong
+  // besides would show.
+  std::erase_if(data_.kepler, [&](const auto& e) { return e.satellite == unusable[0]; });
+  for (gnss::KeplerEphemeris& e : data_.kepler) {
+    if (e.satellite == unusable[1]) e.health = 1, e.m0 += 0.1;
+    if (e.satellite == unusable[2]) e.toe.nanoseconds -= 3LL * 3600 * gnss::kSecondInNanoseconds;
+  }
+  const auto left = prepared(epochs);
+  ASSERT_EQ(left.size(), all.size());
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    EXPECT_EQ(left[i]->satellites.size() + 3, all[i]->satellites.size());
+    for (const RawSatellite& s : left[i]->satellites) {
+      EXPECT_EQ(std::find(unusable.begin(), unusable.end(), s.satellite), unusable.end());
+    }
+  }
+  const auto outcome = fly(left);
+  EXPECT_LT(outcome.velocity_rms, 0.1);
+  EXPECT_LT(outcome.position_rms, 2);
+  gnss::RawLog log;
+  log.epochs = epochs;
+  log.broadcast = data_;
+  const auto said = gnss::unusable_satellites(gnss::run_raw(log, weights()));
+  ASSERT_EQ(said.size(), 3U);
+  EXPECT_EQ(said[0], "no ephemeris: " + to_string(unusable[0]) + " (200 epochs)");
+  EXPECT_EQ(said[1], "stale ephemeris: " + to_string(unusable[2]) + " (200 epochs)");
+  EXPECT_EQ(said[2], "unhealthy: " + to_string(unusable[1]) + " (200 epochs)");
+}
+
+TEST_F(RawFilter, TheEndOfAWeekIsNothingSpecial) {
+  auto epochs = measured({});
+  data_.ionosphere.reset();  // which knows the time of day
+  const auto before = prepared(epochs);
+  const std::int64_t shift =
+      (3 * 86400 + 43200 + 20) * gnss::kSecondInNanoseconds;  // the week ends after 20 s
+  for (gnss::KeplerEphemeris& e : data_.kepler) {
+    e.toe.nanoseconds -= shift;
+    e.toc.nanoseconds -= shift;
+  }
+  for (gnss::Epoch& epoch : epochs) epoch.time.nanoseconds -= shift;
+  RawObserver observer(data_, weights(), LocalFrame::at(place()), Time{gnss::noon().nanoseconds - shift});
+  for (std::size_t i = 0; i < epochs.size(); ++i) {
+    const auto after = observer.observe(epochs[i]);
+    ASSERT_EQ(after->satellites.size(), before[i]->satellites.size());
+    EXPECT_EQ(after->time, before[i]->time);
+    for (std::size_t k = 0; k < after->satellites.size(); ++k) {
+      EXPECT_LT((after->satellites[k].position - before[i]->satellites[k].position).norm(), 1e-3);
+      EXPECT_NEAR(*after->satellites[k].range, *before[i]->satellites[k].range, 1e-3);
+    }
+  }
+}
+
+TEST_F(RawFilter, RepeatedEpochsDoNoHarm) {
+  RawEpochs twice;
+  for (const auto& epoch : prepared(measured({}))) twice.insert(twice.end(), {epoch, epoch});
+  const auto outcome = fly(twice);
+  EXPECT_LT(outcome.velocity_rms, 0.1);
+  EXPECT_LT(outcome.position_rms, 2);
+  EXPECT_LT(outcome.nees, 5);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 
 #include <Eigen/Core>
 
+#include "pade/core/sensors/odometry.hpp"
 #include "pade/core/time.hpp"
 
 namespace pade::gnss {
@@ -153,9 +154,10 @@ struct RawLog {
   std::vector<Epoch> epochs;
   BroadcastData broadcast;
   std::vector<KnownRangeEpoch>
-      known_ranges;                  ///< of recordings that have no ephemerides but satellites' places
-  std::vector<TruePosition> truth;   ///< empty if there is none
-  std::vector<std::string> remarks;  ///< what was left out, and where: one sentence each
+      known_ranges;                      ///< of recordings that have no ephemerides but satellites' places
+  std::vector<PlanarOdometry> odometry;  ///< beside them, in the order of its times; empty if there is none
+  std::vector<TruePosition> truth;       ///< empty if there is none
+  std::vector<std::string> remarks;      ///< what was left out, and where: one sentence each
 };
 
 }  // namespace pade::gnss

@@ -31,8 +31,9 @@ Status parse_rinex_observations(std::string_view text, std::string_view name, gn
 /// version or type, no ephemeris.
 Status parse_rinex_navigation(std::string_view text, std::string_view name, gnss::RawLog& log);
 
-/// Appends `pseudorange3` lines as known ranges and `point3` lines as true positions; other lines are passed
-/// over. Times count from the recording's zero. Errors: neither kind of line, or more than half of them bad.
+/// Appends `pseudorange3` lines as known ranges, `odom3` lines as odometry and `point3` lines as true
+/// positions; other lines are passed over. Times count from the recording's zero. Errors: none of these, or
+/// more than half of them bad.
 Status parse_known_ranges(std::string_view text, std::string_view name, gnss::RawLog& log);
 
 /// Appends the epochs (RXM-RAWX) of a UBX log, and what GPS satellites sent (RXM-SFRBX); the messages of

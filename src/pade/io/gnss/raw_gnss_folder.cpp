@@ -65,6 +65,30 @@ bool add_truth(const std::vector<double>& v, gnss::RawLog& log) {
   return true;
 }
 
+/// "odom3 t vx vy vz wx wy wz", then the six variances. The motion in the plane alone is taken.
+bool add_odometry(const std::vector<double>& v, gnss::RawLog& log) {
+  if (v.size() < 13 || std::abs(v[0]) > 4e9 || !(v[7] > 0) || !(v[12] > 0)) return false;
+  if (std::abs(v[1]) > 1e3 || std::abs(v[6]) > 1e3) return false;
+  const PlanarOdometry sample{Time::from_seconds(v[0]), v[1], v[6], std::sqrt(v[7]), std::sqrt(v[12])};
+  if (!log.odometry.empty() && sample.time <= log.odometry.back().time) return false;
+  log.odometry.push_back(sample);
+  return true;
+}
+
+/// Reads the numbers of a line by its first word; nothing where the word is another.
+struct LineKind {
+  std::string_view word;
+  bool (*add)(const std::vector<double>& numbers, gnss::RawLog& log);
+  const char* expected;
+};
+constexpr std::array kLineKinds{
+    LineKind{"pseudorange3", add_range,
+             "pseudorange3, time, range, variance, ECEF x y z and satellite, rising in time and each "
+             "satellite once"},
+    LineKind{"odom3", add_odometry,
+             "odom3, time, velocity x y z, angular rate x y z and their six variances, rising in time"},
+    LineKind{"point3", add_truth, "point3, time and ECEF x y z, rising in time"}};
+
 struct Files {
   std::vector<fs::path> observations;  ///< RINEX or UBX
   std::vector<fs::path> navigation, ranges;
@@ -122,9 +146,8 @@ std::optional<RawGnssKind> raw_gnss_kind(std::string_view text) {
   if (text.starts_with("\xB5\x62")) return RawGnssKind::ubx;
   const auto fields = split_fields(line);
   if (fields.size() < 4) return std::nullopt;
-  for (const std::string_view word : {"pseudorange3", "odom3", "point3"}) {
-    if (fields.front() == word) return RawGnssKind::known_ranges;
-  }
+  const auto begins = [&](const LineKind& kind) { return kind.word == fields.front(); };
+  if (std::any_of(kLineKinds.begin(), kLineKinds.end(), begins)) return RawGnssKind::known_ranges;
   return std::nullopt;
 }
 
@@ -133,23 +156,23 @@ Status parse_known_ranges(std::string_view text, std::string_view name, gnss::Ra
   std::size_t good = 0, refused = 0;
   for (const Line& line : data_lines(text)) {
     const auto fields = split_fields(line.text);
-    const bool range = fields.front() == "pseudorange3";
-    if (!range && fields.front() != "point3") continue;
+    const auto kind = std::find_if(kLineKinds.begin(), kLineKinds.end(),
+                                   [&](const LineKind& k) { return k.word == fields.front(); });
+    if (kind == kLineKinds.end()) continue;
     const auto numbers = numbers_of(fields);
-    if (numbers && (range ? add_range(*numbers, log) : add_truth(*numbers, log))) {
+    if (numbers && kind->add(*numbers, log)) {
       ++good;
       continue;
     }
     ++refused;
-    bad.add(fmt::format("{}: found {}, expected {}, rising in time and each satellite once; it is left out",
-                        rinex::at_line(name, line.number), in_quotes(line.text),
-                        range ? "pseudorange3, time, range, variance, ECEF x y z and satellite"
-                              : "point3, time and ECEF x y z"));
+    bad.add(fmt::format("{}: found {}, expected {}; it is left out", rinex::at_line(name, line.number),
+                        in_quotes(line.text), kind->expected));
   }
   bad.report(log.remarks);
   if (good > refused) return {};
-  return Error{fmt::format("{}: found {} usable lines of pseudorange3 or point3 and {} others{}", name, good,
-                           refused, refused > 0 ? "; " + log.remarks.back() : ", expected at least one")};
+  return Error{fmt::format("{}: found {} usable lines of pseudorange3, odom3 or point3 and {} others{}", name,
+                           good, refused,
+                           refused > 0 ? "; " + log.remarks.back() : ", expected at least one")};
 }
 
 Result<gnss::RawLog> read_raw_gnss(const std::filesystem::path& path) {

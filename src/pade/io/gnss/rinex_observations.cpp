@@ -112,7 +112,11 @@ std::optional<EpochLine> parse_epoch_line(std::string_view line, const Header& h
   if (!time) return std::nullopt;
   epoch.time = *time;
   epoch.time.nanoseconds -= header.ahead_of_gps * kNanoseconds;
-  if (header.utc) epoch.time.nanoseconds += leap_seconds(*time) * kNanoseconds;
+  if (header.utc) {
+    // Of the minute's start: 23:59:60 is still of the day that the leap second ends.
+    const Time minute{time->nanoseconds - static_cast<std::int64_t>(*second * 1e9)};
+    epoch.time.nanoseconds += leap_seconds(minute) * kNanoseconds;
+  }
   return epoch;
 }
 

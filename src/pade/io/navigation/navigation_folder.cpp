@@ -79,7 +79,8 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   if (!path_exists(imu)) imu = file_ending_with(folder, "-imu.csv");
   if (imu.empty())
     return Error{
-        fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv (raw GNSS alone: --raw){}",
+        fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv (raw GNSS alone: --raw; "
+                    "with odometry: --raw-coupling tight){}",
                     folder.string(), found_files(folder, ".csv"))};
   const auto imu_text = read_file(imu);
   if (!imu_text) return imu_text.error();

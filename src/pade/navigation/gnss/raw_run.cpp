@@ -1,6 +1,9 @@
 #include "pade/navigation/gnss/raw_run.hpp"
 
+#include <map>
 #include <utility>
+
+#include <fmt/format.h>
 
 namespace pade::gnss {
 namespace {
@@ -33,6 +36,26 @@ EpochResult play(const Epoch& epoch, const RawLog& log, const PositioningOptions
 }
 
 }  // namespace
+
+std::vector<std::string> unusable_satellites(const RawRun& run) {
+  std::map<Use, std::map<SatelliteId, std::size_t>> epochs;
+  for (const EpochResult& epoch : run.epochs) {
+    for (const SatelliteView& view : epoch.satellites) {
+      if (view.use == Use::no_ephemeris || view.use == Use::stale || view.use == Use::unhealthy) {
+        ++epochs[view.use][view.satellite];
+      }
+    }
+  }
+  std::vector<std::string> sentences;
+  for (const auto& [use, satellites] : epochs) {
+    std::string names;
+    for (const auto& [satellite, count] : satellites) {
+      names += fmt::format("{}{} ({} epochs)", names.empty() ? "" : ", ", to_string(satellite), count);
+    }
+    sentences.push_back(fmt::format("{}: {}", to_name(use), names));
+  }
+  return sentences;
+}
 
 RawRun run_raw(const RawLog& log, const PositioningOptions& options) {
   RawRun run;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pade/navigation/gnss/positioning.hpp"
@@ -25,6 +26,9 @@ struct RawRun {
   std::array<std::size_t, kUses> uses{};  ///< of all satellites of all epochs, by Use
   std::size_t without_position = 0;       ///< epochs
 };
+
+/// The satellites that were measured and could not be used, by reason: "no ephemeris: E31 (610 epochs)".
+std::vector<std::string> unusable_satellites(const RawRun& run);
 
 /// Plays a log that must outlive the result. The longest step is over 2 s.
 RawRun run_raw(const RawLog& log, const PositioningOptions& options);

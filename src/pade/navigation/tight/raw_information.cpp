@@ -10,6 +10,8 @@ namespace {
 // variable: no residual of it could tell anything.
 constexpr double kSmall = 0.4;
 
+constexpr std::size_t kLeastJudges = 5;  // satellites whose majority can tell that the filter is wrong
+
 /// M v, for a v that may have many zeros. Of this size a general product is three times as slow.
 RawRow product(const RawMatrix& M, const RawRow& v) {
   RawRow sum = RawRow::Zero();
@@ -24,6 +26,11 @@ RawRow product(const RawMatrix& M, const RawRow& v) {
 std::size_t RawEquations::count(RawKind kind, bool used_only) const {
   return static_cast<std::size_t>(std::count_if(
       begin(), end(), [&](const RawEquation& e) { return e.kind == kind && (e.used || !used_only); }));
+}
+
+bool most_refused(const RawEquations& equations, RawKind kind) {
+  const std::size_t all = equations.count(kind, false);
+  return all >= kLeastJudges && 2 * equations.count(kind, true) < all;
 }
 
 void RawInformation::add(const RawEquation& e) {

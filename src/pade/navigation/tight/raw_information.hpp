@@ -13,9 +13,10 @@ enum class RawKind : std::uint8_t { range, rate, phase };
 /// A measurement of one satellite, linearised.
 struct RawEquation {
   RawKind kind = RawKind::range;
-  std::size_t anchored = 0;  ///< of a phase: its place among those at the anchor
-  double residual = 0;       ///< measured less predicted
-  double variance = 1;       ///< of the measurement
+  std::size_t satellite = 0;  ///< its place in the epoch
+  std::size_t anchored = 0;   ///< of a phase: its place among those at the anchor
+  double residual = 0;        ///< measured less predicted
+  double variance = 1;        ///< of the measurement
   RawRow row = RawRow::Zero();
   RawRow spread = RawRow::Zero();  ///< covariance of the variables times `row`
   bool used = true;
@@ -34,6 +35,10 @@ struct RawEquations {
   /// How many of a kind there are, or are used.
   [[nodiscard]] std::size_t count(RawKind kind, bool used_only) const;
 };
+
+/// Whether most of the measurements of a kind, of five at least, are not used: it is then the filter that is
+/// wrong.
+[[nodiscard]] bool most_refused(const RawEquations& equations, RawKind kind);
 
 /// The Kalman update of variables of prior covariance S by scalar measurements, one by one, in a form that
 /// lifts to any state x with cov(x, variables) = C: x <- x + C mean, P <- P - C gain C^T.

@@ -36,8 +36,7 @@ void RawObserver::add_fix(std::span<gnss::SatelliteView> views, const gnss::Posi
   }
 }
 
-RawSatellite RawObserver::satellite_of(const gnss::SatelliteView& view) const {
-  const gnss::Signal& signal = *view.signal;
+RawSatellite RawObserver::satellite_of(const gnss::SatelliteView& view, bool air_is_corrected) const {
   // In the frame of the moment of reception: the Earth turns while the signal is under way, and for longer
   // the farther the satellite is.
   const double distance = (view.state.position - *near_).norm();
@@ -51,39 +50,49 @@ RawSatellite RawObserver::satellite_of(const gnss::SatelliteView& view) const {
 
   RawSatellite s;
   s.satellite = view.satellite;
-  s.code = signal.code;
   s.position = frame_->R_enu_ecef * (position - frame_->origin);
   s.velocity = frame_->R_enu_ecef * (velocity + lengthening * turning);
   s.range = view.range - view.air;
+  const gnss::ViewSigmas sigmas = gnss::sigmas_of(view, air_is_corrected, options_);
+  s.range_sigma = sigmas.range;
+  s.rate_sigma = sigmas.rate;
+  s.phase_sigma = sigmas.phase;
+  if (view.signal == nullptr) return s;
+  const gnss::Signal& signal = *view.signal;
+  s.code = signal.code;
   if (signal.doppler) {
     s.rate = -view.wavelength * *signal.doppler + gnss::kSpeedOfLight * view.state.clock_rate;
   }
   if (signal.carrier) {
     s.phase = view.wavelength * *signal.carrier + gnss::kSpeedOfLight * view.state.clock - view.air_of_phase;
   }
-  const gnss::ViewSigmas sigmas = gnss::sigmas_of(view, true, options_);
-  s.range_sigma = sigmas.range;
-  s.rate_sigma = sigmas.rate;
-  s.phase_sigma = sigmas.phase;
   s.lost_lock = signal.lost_lock;
   s.half_cycle = signal.half_cycle;
   return s;
 }
 
 std::shared_ptr<const RawEpoch> RawObserver::observe(const gnss::Epoch& epoch) {
-  auto views = gnss::views_of(epoch, *broadcast_, options_);
-  const gnss::Atmosphere air{epoch.time, broadcast_->ionosphere};
+  return observe(gnss::views_of(epoch, *broadcast_, options_), epoch.time,
+                 gnss::Atmosphere{epoch.time, broadcast_->ionosphere});
+}
+
+std::shared_ptr<const RawEpoch> RawObserver::observe(const gnss::KnownRangeEpoch& epoch) {
+  return observe(gnss::views_of(epoch), epoch.time, std::nullopt);
+}
+
+std::shared_ptr<const RawEpoch> RawObserver::observe(std::vector<gnss::SatelliteView> views, Time time,
+                                                     const std::optional<gnss::Atmosphere>& air) {
   const auto fix = gnss::locate(views, air, options_, last_);
   if (fix) last_ = fix->position;
   if (fix && (!near_ || (fix->position - *near_).norm() > kNear)) near_ = fix->position;
   if (!near_) return nullptr;
   if (!frame_) frame_ = LocalFrame::at(gnss::geodetic_of(*near_));
   auto result = std::make_shared<RawEpoch>();
-  result->time = Time{epoch.time.nanoseconds - zero_.nanoseconds};
+  result->time = Time{time.nanoseconds - zero_.nanoseconds};
   if (fix) add_fix(views, *fix, *result);
   gnss::look_from(*near_, views, air, options_);
   for (const gnss::SatelliteView& view : views) {
-    if (view.use == gnss::Use::used) result->satellites.push_back(satellite_of(view));
+    if (view.use == gnss::Use::used) result->satellites.push_back(satellite_of(view, air.has_value()));
   }
   return result;
 }

@@ -31,12 +31,16 @@ class RawObserver {
 
   /// Null until a first position has been found (4 satellites, and one more for each further system).
   std::shared_ptr<const RawEpoch> observe(const gnss::Epoch& epoch);
+  /// The same of known ranges, which have neither rate nor phase.
+  std::shared_ptr<const RawEpoch> observe(const gnss::KnownRangeEpoch& epoch);
   /// That of the epochs; empty until there is one.
   [[nodiscard]] const std::optional<LocalFrame>& frame() const { return frame_; }
 
  private:
   void add_fix(std::span<gnss::SatelliteView> views, const gnss::PositionFix& fix, RawEpoch& epoch) const;
-  [[nodiscard]] RawSatellite satellite_of(const gnss::SatelliteView& view) const;
+  [[nodiscard]] RawSatellite satellite_of(const gnss::SatelliteView& view, bool air_is_corrected) const;
+  std::shared_ptr<const RawEpoch> observe(std::vector<gnss::SatelliteView> views, Time time,
+                                          const std::optional<gnss::Atmosphere>& air);
 
   const gnss::BroadcastData* broadcast_;
   gnss::PositioningOptions options_;

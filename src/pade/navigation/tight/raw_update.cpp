@@ -5,43 +5,19 @@
 #include <span>
 
 #include "pade/navigation/filter.hpp"
+#include "pade/navigation/tight/raw_median.hpp"
 
 namespace pade::navigation {
 namespace {
 
-constexpr double kJump = 1e-3 * gnss::kSpeedOfLight;  // clocks jump by whole milliseconds, m
-constexpr double kFirstClockSigma = 30;               // of a clock taken from a median of ranges, m
-constexpr double kFirstDriftSigma = 3;                // likewise, m/s
-constexpr double kVerticalBias = 1.6;                 // of the common bias, against the horizontal one
-constexpr std::size_t kLeastJudges = 5;  // satellites whose majority can tell that the filter is wrong
+constexpr double kFirstClockSigma = 30;  // of a clock taken from a median of ranges, m
+constexpr double kFirstDriftSigma = 3;   // likewise, m/s
+constexpr double kVerticalBias = 1.6;    // of the common bias, against the horizontal one
 constexpr std::size_t kLeastForFix = 4;
 // Doppler comes of the loop that follows the phase: beside a phase it is not news of its own, and counts
 // less.
 constexpr double kBesidePhase = 3;
 constexpr int kLeastContradictions = 3;  // in a row, before the satellites are believed against the filter
-
-/// Finite values whose middle one is asked for.
-class Median {
- public:
-  void add(double value) {
-    if (count_ < values_.size() && std::isfinite(value)) values_.at(count_++) = value;
-  }
-  [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] double value() {
-    if (count_ == 0) return 0;
-    const auto middle = values_.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
-    std::nth_element(values_.begin(), middle, values_.begin() + static_cast<std::ptrdiff_t>(count_));
-    return *middle;
-  }
-
- private:
-  std::array<double, kMostSatellites> values_{};
-  std::size_t count_ = 0;
-};
-
-std::span<const RawSatellite> satellites_of(const RawEpoch& epoch) {
-  return std::span(epoch.satellites).first(std::min(epoch.satellites.size(), kMostSatellites));
-}
 
 /// Whether the bias of the satellite's system is known.
 bool is_known(const RawState& raw, const RawSatellite& satellite) {
@@ -63,20 +39,16 @@ bool goes_on(const AnchoredPhase& anchor, const RawSatellite& satellite) {
          anchor.half_cycle == satellite.half_cycle && anchor.code == satellite.code;
 }
 
-/// Whole milliseconds that all values have in common, m; 0 if they have not.
-double jump_of(Median& residuals) { return std::round(residuals.value() / kJump) * kJump; }
-
-bool most_refused(const RawEquations& equations, RawKind kind) {
-  const std::size_t all = equations.count(kind, false);
-  return all >= kLeastJudges && 2 * equations.count(kind, true) < all;
-}
-
-void count(const RawEquations& equations, RawTally& tally) {
+/// Counts what was used, and says which satellites were not.
+void count(const RawEquations& equations, RawTally& tally, Innovation& innovation) {
   for (const RawEquation& e : equations) {
     RawCounts& counts = e.kind == RawKind::range  ? tally.ranges
                         : e.kind == RawKind::rate ? tally.rates
                                                   : tally.phases;
     ++(e.used ? counts.used : counts.refused);
+    const std::uint64_t bit = e.used ? 0 : std::uint64_t{1} << e.satellite;
+    if (e.kind == RawKind::range) innovation.refused_ranges |= bit;
+    if (e.kind == RawKind::phase) innovation.refused_phases |= bit;
   }
 }
 
@@ -183,9 +155,11 @@ void Filter::follow_clock_jump(const RawEpoch& epoch) {
 void Filter::collect(const RawEpoch& epoch, RawEquations& equations) const {
   const RawState& raw = core_.raw;
   const RawVariables x = raw_variables();
+  std::size_t satellite = 0;
   const auto add = [&](RawKind kind, double measured, double variance, const RawPrediction& predicted) {
     RawEquation& e = equations.add();
     e.kind = kind;
+    e.satellite = satellite;
     e.residual = measured - predicted.value;
     e.variance = variance;
     e.row = predicted.row;
@@ -206,6 +180,7 @@ void Filter::collect(const RawEpoch& epoch, RawEquations& equations) const {
     if (s.range && is_known(raw, s)) {
       add(RawKind::range, *s.range, s.range_sigma * s.range_sigma, predict_range(x, s));
     }
+    ++satellite;
   }
 }
 
@@ -363,7 +338,7 @@ Innovation Filter::update(const RawEpoch& epoch) {
   } else {
     for (RawEquation& e : equations) e.used = false;
   }
-  count(equations, core_.raw.tally);
+  count(equations, core_.raw.tally, innovation);
   innovation.verdict = rates_agree ? Verdict::accepted : Verdict::rejected;
   follow_phases(epoch, equations);
   judge_raw(epoch, innovation);

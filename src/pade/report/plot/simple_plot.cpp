@@ -39,6 +39,14 @@ struct Range {
   }
 };
 
+/// A frame with a title around what is drawn.
+std::string figure(const std::string& title, double width, double height, const std::string& drawn) {
+  return fmt::format(
+      "<figure><figcaption>{}</figcaption><svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" "
+      "aria-label=\"{}\">\n{}</svg></figure>\n",
+      title, width, height, title, drawn);
+}
+
 }  // namespace
 
 std::string simple_plot(const std::string& title, const std::string& x_label, const std::string& y_label,
@@ -71,10 +79,6 @@ std::string simple_plot(const std::string& title, const std::string& x_label, co
 
   std::string svg;
   const auto out = std::back_inserter(svg);
-  fmt::format_to(out,
-                 "<figure><figcaption>{}</figcaption><svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" "
-                 "aria-label=\"{}\">\n",
-                 title, kWidth, height, title);
   fmt::format_to(out,
                  "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#8893a0\"/>\n",
                  kLeft, kTop, inner_width, inner_height);
@@ -119,8 +123,61 @@ std::string simple_plot(const std::string& title, const std::string& x_label, co
                    legend, kTop + 11, s.colour, legend + 17, kTop + 17, s.name);
     legend += 30 + 7.0 * static_cast<double>(s.name.size());
   }
-  svg += "</svg></figure>\n";
-  return svg;
+  return figure(title, kWidth, height, svg);
+}
+
+std::string rows_plot(const std::string& title, const std::string& x_label,
+                      const std::vector<std::string>& names, const std::vector<Series>& series) {
+  constexpr double kWidth = 760;
+  constexpr double kLeft = 62;
+  constexpr double kTop = 30;
+  constexpr double kRow = 13;
+  const double inner_width = kWidth - kLeft - 12;
+  const double inner_height = kRow * static_cast<double>(names.size());
+  const double height = kTop + inner_height + 42;
+  Range x;
+  for (const Series& s : series) {
+    for (const double value : s.x) x.include(value);
+  }
+  x.pad();
+  const auto px = [&](double v) { return kLeft + (v - x.low) / (x.high - x.low) * inner_width; };
+  std::string svg;
+  const auto out = std::back_inserter(svg);
+  fmt::format_to(out,
+                 "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#8893a0\"/>\n",
+                 kLeft, kTop, inner_width, inner_height);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const double y = kTop + kRow * (static_cast<double>(i) + 0.5);
+    fmt::format_to(out,
+                   "<path d=\"M{:.1f} {:.1f}h{:.1f}\" stroke=\"#8893a033\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
+                   "text-anchor=\"end\">{}</text>\n",
+                   kLeft, y, inner_width, kLeft - 6, y + 4, names[i]);
+  }
+  const double dx = tick_step(x.high - x.low);
+  for (double v = std::ceil(x.low / dx) * dx; v <= x.high; v += dx) {
+    fmt::format_to(out,
+                   "<path d=\"M{:.1f} {:.1f}v4\" stroke=\"#8893a0\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
+                   "text-anchor=\"middle\">{:.6g}</text>\n",
+                   px(v), kTop + inner_height, px(v), kTop + inner_height + 17,
+                   std::abs(v) < 1e-9 * dx ? 0 : v);
+  }
+  fmt::format_to(out, "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n",
+                 kLeft + 0.5 * inner_width, height - 6, x_label);
+  double legend = kLeft;
+  for (const Series& s : series) {
+    fmt::format_to(out, "<g stroke=\"{}\" stroke-width=\"1.6\" stroke-opacity=\"0.8\">", s.colour);
+    for (std::size_t i = 0; i < s.x.size(); ++i) {
+      fmt::format_to(out, "<path d=\"M{:.1f} {:.1f}v{}\"/>", px(s.x[i]), kTop + kRow * s.y[i] + 2, kRow - 4);
+    }
+    const std::string name = fmt::format("{}: {}", s.name, s.x.size());
+    fmt::format_to(
+        out,
+        "</g>\n<rect x=\"{:.1f}\" y=\"12\" width=\"12\" height=\"4\" fill=\"{}\"/><text x=\"{:.1f}\" "
+        "y=\"18\">{}</text>\n",
+        legend, s.colour, legend + 17, name);
+    legend += 30 + 7.0 * static_cast<double>(name.size());
+  }
+  return figure(title, kWidth, height, svg);
 }
 
 }  // namespace pade::evaluation

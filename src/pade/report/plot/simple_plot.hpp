@@ -27,4 +27,8 @@ struct Series {
 std::string simple_plot(const std::string& title, const std::string& x_label, const std::string& y_label,
                         const std::vector<Series>& series, bool equal);
 
+/// Events in rows: y = 0 is the first name's, at the top. The legend counts them.
+std::string rows_plot(const std::string& title, const std::string& x_label,
+                      const std::vector<std::string>& names, const std::vector<Series>& series);
+
 }  // namespace pade::evaluation

@@ -1,13 +1,15 @@
-#include "pade/report/raw_gnss_report.hpp"
+#include "pade/report/gnss/raw_gnss_report.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <numbers>
 
 #include <fmt/format.h>
 
+#include "pade/navigation/tight/raw_epoch.hpp"
 #include "pade/report/plot/simple_plot.hpp"
 #include "pade/report/report_style.hpp"
 #include "pade/report/report_text.hpp"
@@ -15,6 +17,7 @@
 namespace pade {
 namespace {
 
+using evaluation::rows_plot;
 using evaluation::Series;
 using evaluation::simple_plot;
 using gnss::EpochResult;
@@ -114,6 +117,42 @@ std::string residual_plot(const gnss::RawRun& run, const std::string& title, con
   return plot_of(title, "time, s", unit, series, false);
 }
 
+/// The rows of a figure, one for each satellite, and the events in them.
+class SlipRows {
+ public:
+  void expect(gnss::SatelliteId satellite) { rows_[satellite] = 0; }
+  /// To be called when all satellites are known.
+  void number() {
+    for (auto& [satellite, row] : rows_) {
+      row = static_cast<double>(names_.size());
+      names_.push_back(to_string(satellite));
+    }
+  }
+  /// What the receiver says of a phase, and else whether it was found.
+  void judge(double t, gnss::SatelliteId satellite, bool lost_lock, bool half_cycle, bool found) {
+    const auto [before, first] = half_cycle_.try_emplace(satellite, half_cycle);
+    const bool changed = !first && before->second != half_cycle;
+    before->second = half_cycle;
+    if (lost_lock || changed || found) {
+      (lost_lock ? lock_ : changed ? half_ : found_).add(t, rows_.at(satellite));
+    }
+  }
+  void refuse_range(double t, gnss::SatelliteId satellite) { range_.add(t, rows_.at(satellite)); }
+  [[nodiscard]] std::string figure(const std::string& title) const {
+    if (rows_.empty()) return {};
+    return rows_plot(title, "time, s", names_, {lock_, half_, found_, range_});
+  }
+
+ private:
+  std::map<gnss::SatelliteId, double> rows_;
+  std::map<gnss::SatelliteId, bool> half_cycle_;  // as it was last
+  std::vector<std::string> names_;
+  Series lock_{"lock lost", "#0072b2", {}, {}, true};
+  Series half_{"half a cycle flagged", "#e69f00", {}, {}, true};
+  Series found_{"found by the gate", "#d55e00", {}, {}, true};
+  Series range_{"range refused", "#9aa5b1", {}, {}, true};
+};
+
 std::string path_plot(const gnss::RawLog& log, const gnss::RawRun& run, const LocalFrame& frame) {
   Series path{"positions", "#0072b2", {}, {}, true};
   Series truth{"truth", "#d55e00", {}, {}, false};
@@ -148,9 +187,11 @@ std::string counts_table(const gnss::RawRun& run, const std::optional<RawScore>&
                    gnss::to_name(static_cast<Use>(i)), run.uses.at(i));
   }
   if (score) {
-    fmt::format_to(std::back_inserter(html),
-                   "<tr><td>against truth, rms: horizontal, vertical</td><td>{:.2f}, {:.2f} m</td></tr>\n",
-                   score->horizontal_rms, score->vertical_rms);
+    fmt::format_to(
+        std::back_inserter(html),
+        "<tr><td>against truth, horizontal: median, rms, 95 %; vertical: rms</td><td>{:.2f}, {:.2f}, "
+        "{:.2f} m; {:.2f} m</td></tr>\n",
+        score->horizontal_median, score->horizontal_rms, score->horizontal_95, score->vertical_rms);
   }
   return html + "</table>\n";
 }
@@ -236,24 +277,40 @@ std::string format_residuals(const gnss::RawRun& run) {
   return text;
 }
 
-std::optional<RawScore> score_positions(const gnss::RawLog& log, const gnss::RawRun& run) {
+std::optional<RawScore> score_errors(const std::vector<Eigen::Vector3d>& errors) {
+  if (errors.empty()) return std::nullopt;
   RawScore score;
-  double horizontal = 0;
-  double vertical = 0;
-  auto truth = log.truth.begin();
-  for (const EpochResult& e : run.epochs) {
-    while (truth != log.truth.end() && truth->time < e.time) ++truth;
-    if (!e.position || truth == log.truth.end() || truth->time != e.time) continue;
-    const Eigen::Vector3d error =
-        gnss::enu_axes(gnss::geodetic_of(truth->position)) * (e.position->position - truth->position);
-    horizontal += error.head<2>().squaredNorm();
-    vertical += error.z() * error.z();
-    ++score.epochs;
+  score.epochs = errors.size();
+  std::vector<double> sizes;
+  for (const Eigen::Vector3d& error : errors) {
+    sizes.push_back(error.head<2>().norm());
+    score.horizontal_rms += error.head<2>().squaredNorm();
+    score.vertical_rms += error.z() * error.z();
   }
-  if (score.epochs == 0) return std::nullopt;
-  score.horizontal_rms = std::sqrt(horizontal / static_cast<double>(score.epochs));
-  score.vertical_rms = std::sqrt(vertical / static_cast<double>(score.epochs));
+  std::sort(sizes.begin(), sizes.end());
+  const auto count = static_cast<double>(errors.size());
+  score.horizontal_median = sizes[sizes.size() / 2];
+  score.horizontal_95 = sizes[sizes.size() * 95 / 100];
+  score.horizontal_rms = std::sqrt(score.horizontal_rms / count);
+  score.vertical_rms = std::sqrt(score.vertical_rms / count);
   return score;
+}
+
+std::optional<Eigen::Vector3d> truth_at(const gnss::RawLog& log, Time time) {
+  const auto at = std::lower_bound(log.truth.begin(), log.truth.end(), time,
+                                   [](const gnss::TruePosition& p, Time t) { return p.time < t; });
+  if (at == log.truth.end() || at->time != time) return std::nullopt;
+  return at->position;
+}
+
+std::optional<RawScore> score_positions(const gnss::RawLog& log, const gnss::RawRun& run) {
+  std::vector<Eigen::Vector3d> errors;
+  for (const EpochResult& e : run.epochs) {
+    const auto truth = truth_at(log, e.time);
+    if (!e.position || !truth) continue;
+    errors.emplace_back(gnss::enu_axes(gnss::geodetic_of(*truth)) * (e.position->position - *truth));
+  }
+  return score_errors(errors);
 }
 
 RawSummary summary_of(const gnss::RawRun& run) {
@@ -284,6 +341,49 @@ RawSummary summary_of(const gnss::RawRun& run) {
   return s;
 }
 
+std::string slip_plot(const gnss::RawRun& run) {
+  SlipRows rows;
+  for (const EpochResult& e : run.epochs) {
+    for (const SatelliteView& v : e.satellites) {
+      if (v.use == Use::used || v.use == Use::outlier) rows.expect(v.satellite);
+    }
+  }
+  rows.number();
+  for (const EpochResult& e : run.epochs) {
+    const double t = seconds_between(run.epochs.front().time, e.time);
+    for (const SatelliteView& v : e.satellites) {
+      if (v.use != Use::used && v.use != Use::outlier) continue;
+      if (v.use == Use::outlier) rows.refuse_range(t, v.satellite);
+      if (v.signal == nullptr || !v.signal->carrier) continue;
+      rows.judge(t, v.satellite, v.signal->lost_lock, v.signal->half_cycle, v.phase_use == Use::outlier);
+    }
+  }
+  return rows.figure("Slips of the phases since the epoch before, and ranges refused");
+}
+
+std::string slip_plot(const NavigationRun& run) {
+  if (run.raw.ranges.used + run.raw.phases.used == 0) return {};
+  SlipRows rows;
+  std::optional<Time> first;
+  for (const navigation::Measurement& m : run.measurements) {
+    if (m.kind != navigation::SensorKind::raw_gnss) continue;
+    if (!first) first = m.time;
+    for (const navigation::RawSatellite& s : m.raw->satellites) rows.expect(s.satellite);
+  }
+  rows.number();
+  for (const navigation::Measurement& m : run.measurements) {
+    if (m.kind != navigation::SensorKind::raw_gnss) continue;
+    const double t = seconds_between(*first, m.time);
+    for (std::size_t i = 0; i < std::min<std::size_t>(m.raw->satellites.size(), 64); ++i) {
+      const navigation::RawSatellite& s = m.raw->satellites[i];
+      const auto has = [&](std::uint64_t bits) { return (bits >> i & 1) != 0; };
+      if (s.phase) rows.judge(t, s.satellite, s.lost_lock, s.half_cycle, has(m.innovation.refused_phases));
+      if (has(m.innovation.refused_ranges)) rows.refuse_range(t, s.satellite);
+    }
+  }
+  return rows.figure("Slips of the phases and ranges refused, as the filter's gates found them");
+}
+
 std::string raw_report(const std::string& title, const gnss::RawLog& log, const gnss::RawRun& run,
                        const std::optional<RawScore>& score) {
   std::string html = fmt::format(
@@ -304,6 +404,7 @@ std::string raw_report(const std::string& title, const gnss::RawLog& log, const 
   html += residual_plot(
       run, "Residuals of the phases since the epoch before", "m", [](const auto& v) { return v.phase_use; },
       [](const auto& v) { return v.phase_residual; });
+  html += slip_plot(run);
   return html + "</main></body></html>\n";
 }
 
