@@ -18,7 +18,6 @@
 #include "pade/io/text.hpp"
 #include "pade/pipeline/depth_from.hpp"
 #include "pade/pipeline/map_sequence.hpp"
-#include "pade/pipeline/poses_from_sensors.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"
@@ -91,11 +90,6 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.topics, arguments.topics);
   if (arguments.imu) set_imu(options, *arguments.imu);
   if (arguments.feed_camera) options.navigation.filter.camera = *arguments.feed_camera == "on";
-  if (options.navigation.filter.camera && options.sequence.poses != poses_from_sensors) {
-    return Error{fmt::format(
-        "--feed-camera (navigation.filter.camera) is on, but the poses are {}: expected --poses {}",
-        options.sequence.poses, poses_from_sensors)};
-  }
   options.sequence.strict = options.sequence.strict || arguments.strict;
   options.world_coordinates = options.world_coordinates || arguments.world_coordinates;
   options.pcd = options.pcd || arguments.pcd;

@@ -257,6 +257,20 @@ TEST_F(MapFromSensors, TheCameraFedBackMakesTheMotionKnownWithoutACompass) {
   }
 }
 
+TEST_F(MapFromSensors, ACameraThatCannotBeFedBackIsRefused) {
+  MapSequenceOptions fed = options("groundtruth");
+  fed.navigation.filter.camera = true;
+  const auto refusal = [&] {
+    const auto sequence = open_sequence(flown(), fed);
+    return sequence ? std::string("accepted") : sequence.error().message;
+  };
+  EXPECT_THAT(refusal(), HasSubstr("the poses are groundtruth, expected from-imu-gnss"));
+  fed.sequence.poses = poses_from_sensors;
+  EXPECT_EQ(refusal(), "accepted");
+  fed.mapper.refinement.on = false;
+  EXPECT_THAT(refusal(), HasSubstr("mapper.refinement.on (--refine-motion) is off, expected on"));
+}
+
 TEST_F(MapFromSensors, UsesNothingThatTheSensorsShowAfterAFrame) {
   const auto whole = open(flown());
   ASSERT_TRUE(whole) << whole.error().message;

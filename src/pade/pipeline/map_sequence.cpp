@@ -294,15 +294,28 @@ Status read_options(std::string_view text, std::string_view file, MapSequenceOpt
 }
 
 Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options) {
+  const bool fed = options.navigation.filter.camera;
+  if (fed && options.sequence.poses != poses_from_sensors) {
+    return Error{fmt::format(
+        "navigation.filter.camera (--feed-camera) is on and the poses are {}, expected {}: nothing else "
+        "has a filter to feed",
+        options.sequence.poses, poses_from_sensors)};
+  }
+  if (fed && !options.mapper.refinement.on) {
+    return Error{
+        "navigation.filter.camera (--feed-camera) is on and mapper.refinement.on (--refine-motion) is off, "
+        "expected on: it is the refinement that finds the motion"};
+  }
   if (options.sequence.poses != poses_from_sensors) return io::Sequence::open(folder, options.sequence);
   const std::string& topics = options.sequence.topics;
-  if (!options.navigation.filter.camera)
+  if (!fed)
     return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation, topics));
   // First for the images alone, of which the filter has yet to say which ones have a pose.
   const auto images = io::Sequence::open(folder, options.sequence, no_poses);
   if (!images) return images.error();
-  const FedImages fed{*images, options.mapper.refinement};
-  return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation, topics, &fed));
+  const FedImages looked_at{*images, options.mapper.refinement};
+  return io::Sequence::open(folder, options.sequence,
+                            poses_from_imu_gnss(options.navigation, topics, &looked_at));
 }
 
 Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,
