@@ -311,7 +311,7 @@ TEST(MotionRefinement, TheImagesAloneErrAsTheySayWhateverThePrior) {
     double apart = 0;
     for (int draw = 0; draw < kDraws; ++draw) {
       const RelativeMotion prior = drawn_prior(truth, 0.1, 5, random);
-      const RelativeMotion other = drawn_prior(truth, 0.03, 2, random);
+      const RelativeMotion other = drawn_prior(truth, 0.008, 0.3, random);  // knows as much as the images
       const FlowField flow = flow_of(depth, truth, prior.R_reference_other, {}, random);
       MotionRefiner refiner(options);
       const RefinedMotion found = refiner.refine({c, prior, flow, prior.R_reference_other});
