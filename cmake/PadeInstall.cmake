@@ -19,6 +19,7 @@ set(pade_public_headers
   core/result.hpp
   core/sensors/measurements.hpp
   core/time.hpp
+  navigation/camera/camera_motion.hpp
   navigation/filter_options.hpp
   navigation/measurement.hpp
   navigation/navigator.hpp

@@ -41,7 +41,7 @@ struct MapArguments {
   bool no_report = false;
   int threads = 1;
 
-  std::optional<std::string> flow, poses, calibration, world_up, origin, topics, refine_motion;
+  std::optional<std::string> flow, poses, calibration, world_up, origin, topics, refine_motion, feed_camera;
   std::optional<DepthFrom> depth;
   std::optional<depth::Model> model;
   std::optional<depth::Reading> reading;
@@ -89,6 +89,7 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.camera, arguments.camera);
   set(options.sequence.topics, arguments.topics);
   if (arguments.imu) set_imu(options, *arguments.imu);
+  if (arguments.feed_camera) options.navigation.filter.camera = *arguments.feed_camera == "on";
   options.sequence.strict = options.sequence.strict || arguments.strict;
   options.world_coordinates = options.world_coordinates || arguments.world_coordinates;
   options.pcd = options.pcd || arguments.pcd;
@@ -242,6 +243,11 @@ void add_map(CLI::App& app, Context& context) {
       "groundtruth (default), original, from-imu-gnss (imu.csv and gnss.csv through the navigation\n"
       "filter), or a pose file (TUM)");
   add_enum(*map, "--imu", a->imu, "class of the IMU, for --poses from-imu-gnss (default industrial)");
+  map->add_option(
+         "--feed-camera", a->feed_camera,
+         "for --poses from-imu-gnss: on: what the images show of the motion goes into the navigation\n"
+         "filter, too, which then knows its yaw without a compass; off (default)")
+      ->check(CLI::IsMember({"on", "off"}));
   map->add_option("--calibration", a->calibration, "calibration file instead of the sequence's own");
   map->add_option("--topics", a->topics,
                   "topics of a recording that are meant where several fit, separated by blanks");

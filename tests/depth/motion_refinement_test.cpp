@@ -289,6 +289,73 @@ TEST(MotionRefinement, TowardAPlaneYawAndASidewaysStepLookAlikeAndThePriorRules)
   EXPECT_LT(information(found.motion), 2 * information(prior));
 }
 
+/// Error of what the images alone show, as ImageMotion::information weighs it.
+Vector6d image_error(const RelativeMotion& truth, const ImageMotion& images) {
+  RelativeMotion estimate = truth;
+  estimate.R_reference_other = images.R_reference_other;
+  Vector6d error;
+  const Eigen::Matrix3d projector =
+      Eigen::Matrix3d::Identity() - images.direction * images.direction.transpose();
+  error << projector * truth.t_reference_other.normalized(), rotation_error(truth, estimate);
+  return error;
+}
+
+TEST(MotionRefinement, TheImagesAloneErrAsTheySayWhateverThePrior) {
+  for (const Depth& depth : {Depth(wall_and_ground), Depth(forest)}) {
+    const RelativeMotion truth = motion(kForward);
+    const Camera c = camera();
+    MotionRefinementOptions options;
+    options.inflation = 1;
+    Random random(12);
+    double nees = 0;
+    double apart = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      const RelativeMotion prior = drawn_prior(truth, 0.1, 5, random);
+      const RelativeMotion other = drawn_prior(truth, 0.008, 0.3, random);  // knows as much as the images
+      const FlowField flow = flow_of(depth, truth, prior.R_reference_other, {}, random);
+      MotionRefiner refiner(options);
+      const RefinedMotion found = refiner.refine({c, prior, flow, prior.R_reference_other});
+      const RefinedMotion again = refiner.refine({c, other, flow, prior.R_reference_other});
+      ASSERT_EQ(found.outcome, RefinementOutcome::refined);
+      ASSERT_EQ(again.outcome, RefinementOutcome::refined);
+      const Vector6d error = image_error(truth, found.images);
+      nees += error.dot(found.images.information * error) / kDraws;
+      const Vector6d difference = error - image_error(truth, again.images);
+      apart += difference.dot(found.images.information * difference) / kDraws;
+      Vector6d longer = Vector6d::Zero();
+      longer.head<3>() = found.images.direction;
+      EXPECT_LT((found.images.information * longer).norm(), 1e-6 * found.images.information.norm());
+      // Prior and images together are the refined motion.
+      const Matrix5d with_prior = of_direction_and_rotation(prior).inverse();
+      Eigen::Matrix<double, 6, 5> axes = Eigen::Matrix<double, 6, 5>::Zero();
+      axes.topLeftCorner<3, 2>() = across(prior.t_reference_other);
+      axes.bottomRightCorner<3, 3>().setIdentity();
+      const Matrix5d both = (with_prior + axes.transpose() * found.images.information * axes).inverse();
+      const Matrix5d stated = of_direction_and_rotation(found.motion);
+      EXPECT_NEAR((both.bottomRightCorner<3, 3>().trace() / stated.bottomRightCorner<3, 3>().trace()), 1,
+                  0.1);
+      EXPECT_NEAR((both.topLeftCorner<2, 2>().trace() / stated.topLeftCorner<2, 2>().trace()), 1, 0.1);
+    }
+    EXPECT_GT(nees, 3.5);
+    EXPECT_LT(nees, 7);
+    EXPECT_LT(apart, 0.25) << "the prior must not be in it";
+  }
+}
+
+TEST(MotionRefinement, OfWhatLooksAlikeTheImagesAloneSayNothing) {
+  Random random(3);
+  const RelativeMotion truth = motion({0, 0, -0.2});
+  const RelativeMotion prior = drawn_prior(truth, 0.1, 5, random);
+  const Camera c = camera();
+  const RefinedMotion found = MotionRefiner().refine(
+      {c, prior, flow_of(plane, truth, prior.R_reference_other, {}, random), prior.R_reference_other});
+  ASSERT_EQ(found.outcome, RefinementOutcome::refined);
+  Vector6d weak;
+  weak << -8 / 0.2, 0, 0, 0, 1, 0;  // a step sideways and a turn, see above
+  EXPECT_LT(weak.normalized().dot(found.images.information * weak.normalized()),
+            1 / std::pow(2 * kDegree, 2));
+}
+
 TEST(MotionRefinement, AnExactPriorIsReturnedAsItIs) {
   Random random(1);
   const Camera c = camera();

@@ -1,14 +1,22 @@
 // From raw sensors to depth: a simulated flight is mapped with the poses that the navigation filter makes of
 // its imu.csv and gnss.csv.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <sstream>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "pade/evaluation/navigation_score.hpp"
+#include "pade/pipeline/camera/camera_feedback.hpp"
+#include "pade/pipeline/checked_log.hpp"
 #include "pade/pipeline/map_sequence.hpp"
 #include "pade/pipeline/poses_from_sensors.hpp"
 #include "pade/simulation/flight/simulated_sequence.hpp"
@@ -145,6 +153,122 @@ TEST_F(MapFromSensors, FramesCarryTheCovarianceOfTheirMotionAndItIsHonest) {
   EXPECT_GT(nees, 0.3);
   EXPECT_LT(nees, 8);  // errors of neighbours are one error: a single short flight scatters widely
   EXPECT_LT(rotation_nees, 6);
+}
+
+/// 95 % of the errors of the motions between frames, degrees.
+struct MotionErrors {
+  double rotation = 0, direction = 0, rotation_nees = 0, direction_nees = 0;
+  std::size_t frames = 0;
+};
+MotionErrors errors_of(const io::Sequence& estimated, const io::Sequence& exact, double from) {
+  constexpr double kDegree = 0.017453292519943295;
+  std::map<Time, Pose> truth;
+  for (std::size_t i = 0; i < exact.size(); ++i) truth[exact.time(i)] = exact.pose(i);
+  std::vector<double> rotation, direction;
+  MotionErrors errors;
+  errors.frames = estimated.size();
+  for (std::size_t i = 1; i < estimated.size(); ++i) {
+    if (estimated.time(i).seconds() < from) continue;
+    const RelativeMotion motion = relative_motion(estimated.pose(i - 1), estimated.pose(i), 0.1);
+    const RelativeMotion right =
+        relative_motion(truth.at(estimated.time(i - 1)), truth.at(estimated.time(i)), 0.1);
+    const Eigen::Vector3d turn =
+        rotation_log(Eigen::Matrix3d(motion.R_reference_other * right.R_reference_other.transpose()));
+    const Eigen::Vector3d d = motion.t_reference_other.normalized();
+    const Eigen::Vector3d d_right = right.t_reference_other.normalized();
+    rotation.push_back(turn.norm() / kDegree);
+    direction.push_back(std::acos(std::min(1.0, d.dot(d_right))) / kDegree);
+    const Matrix6d covariance = estimated.frame(i)->motion_covariance;
+    errors.rotation_nees += turn.dot(covariance.bottomRightCorner<3, 3>().ldlt().solve(turn));
+    Eigen::Matrix<double, 3, 2> across;
+    across.col(0) = d.unitOrthogonal();
+    across.col(1) = d.cross(across.col(0));
+    const Eigen::Vector2d aside = motion.t_reference_other.norm() * across.transpose() * (d - d_right);
+    errors.direction_nees +=
+        aside.dot((across.transpose() * covariance.topLeftCorner<3, 3>() * across).inverse() * aside);
+  }
+  const auto most = [](std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values.empty() ? 0 : values[values.size() * 95 / 100];
+  };
+  errors.rotation_nees /= static_cast<double>(rotation.size());
+  errors.direction_nees /= static_cast<double>(rotation.size());
+  errors.rotation = most(rotation);
+  errors.direction = most(direction);
+  return errors;
+}
+
+/// Largest error of the filter's own yaw from some time on, degrees.
+double yaw_error(const fs::path& folder, const io::Sequence& images, double from) {
+  constexpr double kDegree = 0.017453292519943295;
+  const auto checked = read_checked_log(folder, {});
+  EXPECT_TRUE(checked);
+  NavigationRunOptions run;
+  run.T_body_camera.rotation = Eigen::Quaterniond(forward_camera_rotation());
+  run.navigator.filter.camera = true;
+  for (std::size_t i = 0; i < images.size(); ++i) run.frames.push_back(images.time(i));
+  CameraFeedback feedback(images, {}, checked->log, run.T_body_camera, 0);
+  run.camera = std::ref(feedback);
+  double largest = 0;
+  for (const NavigationFrame& frame : run_navigation(checked->log, run).frames) {
+    if (frame.time.seconds() < from) continue;
+    const auto truth = evaluation::truth_at(checked->log.truth, frame.time);
+    if (!truth) continue;
+    const Eigen::Vector3d off = rotation_log(
+        Eigen::Quaterniond(frame.pose.T_world_body.rotation * truth->T_world_body.rotation.conjugate()));
+    largest = std::max(largest, std::abs(off.z()) / kDegree);
+  }
+  return largest;
+}
+
+TEST_F(MapFromSensors, TheCameraFedBackMakesTheMotionKnownWithoutACompass) {
+  const fs::path blind = copy("no_compass");
+  fs::remove(blind / "mag.csv");
+  const auto exact = open_sequence(flown(), options("groundtruth"));
+  ASSERT_TRUE(exact);
+  MapSequenceOptions fed = options(poses_from_sensors);
+  fed.navigation.filter.camera = true;
+  const auto print = [](const char* what, const MotionErrors& one) {
+    std::printf(
+        "%s: %zu frames; 95 %% from 4 s on: rotation %.4f, direction %.2f deg; NEES of rotation %.2f (3), "
+        "direction "
+        "%.2f (2)\n",
+        what, one.frames, one.rotation, one.direction, one.rotation_nees, one.direction_nees);
+  };
+  const auto alone = open(flown());
+  ASSERT_TRUE(alone);
+  print("sensors alone", errors_of(*alone, *exact, 4));
+  EXPECT_FALSE(open(blind)) << "hardly a frame has a pose";
+  for (const fs::path& folder : {flown(), blind}) {
+    const auto sequence = open_sequence(folder, fed);
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    const MotionErrors errors = errors_of(*sequence, *exact, 4);
+    print(folder == blind ? "camera fed back, no compass" : "camera fed back", errors);
+    for (const std::string& note : sequence->notes()) std::printf("  %s\n", note.c_str());
+    EXPECT_THAT(sequence->notes(), testing::Contains(HasSubstr("the camera is fed back")));
+    EXPECT_GT(errors.frames, 60U);
+    EXPECT_LT(errors.rotation, 0.025);
+    EXPECT_LT(errors.direction, 1);
+    EXPECT_LT(errors.rotation_nees, 5);
+    EXPECT_LT(errors.direction_nees, 3.3);
+    const double yaw = yaw_error(folder, *exact, 5);
+    std::printf("  the filter's own yaw is wrong by at most %.2f degrees from 5 s on\n", yaw);
+    EXPECT_LT(yaw, 2);
+  }
+}
+
+TEST_F(MapFromSensors, ACameraThatCannotBeFedBackIsRefused) {
+  MapSequenceOptions fed = options("groundtruth");
+  fed.navigation.filter.camera = true;
+  const auto refusal = [&] {
+    const auto sequence = open_sequence(flown(), fed);
+    return sequence ? std::string("accepted") : sequence.error().message;
+  };
+  EXPECT_THAT(refusal(), HasSubstr("the poses are groundtruth, expected from-imu-gnss"));
+  fed.sequence.poses = poses_from_sensors;
+  EXPECT_EQ(refusal(), "accepted");
+  fed.mapper.refinement.on = false;
+  EXPECT_THAT(refusal(), HasSubstr("mapper.refinement.on (--refine-motion) is off, expected on"));
 }
 
 TEST_F(MapFromSensors, UsesNothingThatTheSensorsShowAfterAFrame) {

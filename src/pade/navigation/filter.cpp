@@ -49,6 +49,7 @@ void Filter::start(const NavigationState& state, const BaseMatrix& covariance) {
   clones_ = 0;
   P_.setZero(common(), common());
   P_.topLeftCorner<kBase, kBase>() = covariance;
+  if (options_.camera) start_camera();
 }
 
 FilterSnapshot Filter::snapshot() const {
@@ -85,13 +86,16 @@ void Filter::propagate(Time to, const Vector3d& rate_mean, const Vector3d& force
   const bool force_saturated = force_mean.cwiseAbs().maxCoeff() > options_.accelerometer_range;
   const Vibration& vibration = core_.vibration;
   const double saturated = 1e5;
-  accumulate(core_.pending, step, dt,
-             noise_power(options_.gyroscope_noise, options_.gyroscope_vibration, vibration.rate_variance,
-                         vibration.interval) *
-                 (rate_saturated ? saturated : 1),
-             noise_power(options_.accelerometer_noise, options_.accelerometer_vibration,
-                         vibration.force_variance, vibration.interval) *
-                 (force_saturated ? saturated : 1));
+  const double rate_noise = options_.camera
+                                ? std::max(options_.gyroscope_noise, options_.camera_gyroscope_noise)
+                                : options_.gyroscope_noise;
+  accumulate(
+      core_.pending, step, dt,
+      noise_power(rate_noise, options_.gyroscope_vibration, vibration.rate_variance, vibration.interval) *
+          (rate_saturated ? saturated : 1),
+      noise_power(options_.accelerometer_noise, options_.accelerometer_vibration, vibration.force_variance,
+                  vibration.interval) *
+          (force_saturated ? saturated : 1));
 
   const Vector3d gravity(0, 0, -options_.gravity);
   const Matrix3d R = state.X.R.toRotationMatrix();
@@ -204,6 +208,7 @@ void Filter::apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 
   const ExtendedPose before = core_.state.X;
   core_.state.retract(error.head<kBase>());
   if (options_.raw_gnss) core_.raw.receiver.retract(error.segment<kRawStates>(kBase));
+  if (options_.camera) core_.camera.retract(error.segment<kCameraStates>(camera_at()));
   for (int i = 0; i < clones_; ++i) {
     const auto xi = error.segment<6>(clone_at(i));
     Pose& pose = clone_poses_[static_cast<std::size_t>(i)];

@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "pade/core/sensors/measurements.hpp"
+#include "pade/navigation/camera/camera_state.hpp"
 #include "pade/navigation/filter_options.hpp"
 #include "pade/navigation/filter_state.hpp"
 #include "pade/navigation/imu_increment.hpp"
@@ -22,10 +23,11 @@
 namespace pade::navigation {
 
 inline constexpr int kMaxClones = 10;
-inline constexpr int kMostCommon = kBase + kRawStates;  ///< errors without those of the clones
-/// Even, one more than there are: what Eigen may align it sums in pairs, and without raw GNSS the sums must
-/// be those of a filter that knows nothing of it, to the last bit.
-inline constexpr int kMaxState = kMostCommon + 1 + 6 * kMaxClones;
+inline constexpr int kMostCommon = kBase + kRawStates + kCameraStates;  ///< errors without the clones'
+/// Even: what Eigen may align it sums in pairs, and without raw GNSS and camera the sums must be those of a
+/// filter that knows nothing of them, to the last bit.
+inline constexpr int kMaxState = kMostCommon + 6 * kMaxClones;
+static_assert(kMaxState % 2 == 0);
 
 /// Split of a reported GNSS position error into white noise and Gauss-Markov bias.
 struct GnssErrorClass {
@@ -62,12 +64,13 @@ struct FilterCore {
   int position_rejections = 0;  ///< in a row
   int velocity_rejections = 0;
   Integrity integrity;
-  RawState raw;  ///< of no account unless raw GNSS is expected
+  RawState raw;        ///< of no account unless raw GNSS is expected
+  CameraState camera;  ///< likewise motions of the camera
 };
 
 /// What is kept to come back to: everything but clones.
 struct FilterSnapshot : FilterCore {
-  /// Of the 22 errors, and the 9 of raw GNSS if it is expected.
+  /// Of the 22 errors, and the 9 of raw GNSS and the 9 of the camera if these are expected.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostCommon, kMostCommon> P = BaseMatrix::Zero();
 };
 
@@ -115,6 +118,10 @@ class Filter {
   /// Every satellite for itself. Before watch(), position and velocity of the epoch instead, if it has them.
   /// The innovation is that of the velocity from Doppler.
   Innovation update(const RawEpoch& epoch);
+  /// Of the image that the present pose is that of, if the older one was marked. Marks this image.
+  Innovation update(const CameraMotion& motion);
+  /// The present pose is that of an image, from which a motion may be measured.
+  Innovation mark_image();
   /// Levelling: the mean specific force of a body known to be unaccelerated.
   Innovation update_static_force(const Vector3d& force, double sigma);
 
@@ -127,6 +134,9 @@ class Filter {
   [[nodiscard]] int clones() const { return clones_; }
   /// Motion from clone `index` to the present pose.
   CloneMotion motion_since(int index);
+  /// That of a camera on the body, with what is known of its mounting.
+  /// @param T_body_camera  as calibrated
+  CloneMotion camera_motion_since(int index, const Pose& T_body_camera);
 
   /// The pose without the jumps of corrections: it follows the filtered one with a time constant of 2 s.
   [[nodiscard]] ExtendedPose smooth_pose() const;
@@ -138,7 +148,9 @@ class Filter {
   using TallMatrix = Eigen::Matrix<double, Eigen::Dynamic, kRawVariables, 0, kMaxState, kRawVariables>;
 
   /// Errors in front of those of the clones.
-  [[nodiscard]] int common() const { return options_.raw_gnss ? kMostCommon : kBase; }
+  [[nodiscard]] int common() const { return camera_at() + (options_.camera ? kCameraStates : 0); }
+  /// First of the camera's errors.
+  [[nodiscard]] int camera_at() const { return kBase + (options_.raw_gnss ? kRawStates : 0); }
   [[nodiscard]] int size() const { return common() + 6 * clones_; }
   [[nodiscard]] int clone_at(int index) const { return common() + 6 * index; }
   void flush();
@@ -158,6 +170,10 @@ class Filter {
   Innovation correct(const Prediction<M>& prediction, const Eigen::Matrix<double, M, 1>& residual,
                      Eigen::Matrix<double, M, M> noise, double gate, bool force = false);
   void apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1>& error);
+
+  // The camera (camera/camera_update.cpp).
+  void start_camera();
+  Innovation correct_by_camera(const CameraMotion& motion);
 
   // Raw GNSS (tight/raw_update.cpp).
   void flush_receiver(double T);

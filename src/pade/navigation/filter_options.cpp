@@ -8,6 +8,7 @@ FilterOptions FilterOptions::of(ImuClass imu) {
   FilterOptions options;
   if (imu == ImuClass::consumer) {
     options.gyroscope_noise = 1e-4;
+    options.camera_gyroscope_noise = 1e-4;
     options.gyroscope_vibration = 0.2;
     options.accelerometer_vibration = 0.35;
     options.gyroscope_bias_walk = 3e-5;
@@ -49,6 +50,9 @@ Status check(const FilterOptions& o) {
       {"raw_bias_sigma", o.raw_bias_sigma, above_zero, finite},
       {"raw_gate", o.raw_gate, 1, finite},
       {"phase_anchor_time", o.phase_anchor_time, 0, 60},
+      {"camera_mounting_sigma", o.camera_mounting_sigma, 0, 0.2},
+      {"camera_inflation", o.camera_inflation, above_zero, finite},
+      {"camera_gyroscope_noise", o.camera_gyroscope_noise, 0, finite},
       {"gate_probability_3", o.gate_probability_3, above_zero},
       {"gate_probability_2", o.gate_probability_2, above_zero},
       {"gate_probability_1", o.gate_probability_1, above_zero},

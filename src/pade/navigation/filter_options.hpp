@@ -63,6 +63,14 @@ struct FilterOptions {
   double raw_gate = 4;            ///< sigmas beyond which a measurement of a satellite is not used
   double phase_anchor_time = 1;   ///< phases are counted from one epoch for so long, s
 
+  // Motions between images (docs/navigation.md, section 9).
+  bool camera = false;  ///< they are expected
+  double camera_mounting_sigma =
+      0.005;                    ///< of the calibrated rotation of the camera on the body, per axis, rad
+  double camera_inflation = 1;  ///< of the variance that a motion between images claims
+  double camera_gyroscope_noise = 2.4e-4;  ///< the gyroscopes' white noise is at least this, as images make
+                                           ///< the bias known that else covers it, rad/s/sqrt(Hz)
+
   // Robustness.
   double gate_probability_3 = 16.27;  ///< chi-square bound of 3 degrees of freedom (99.9 %)
   double gate_probability_2 = 13.82;  ///< of 2 degrees of freedom
@@ -111,6 +119,12 @@ struct FilterOptions {
           "what all pseudoranges together are wrong by for minutes, per axis, m");
     field("raw_gate", self.raw_gate, "sigmas beyond which a measurement of a satellite is not used");
     field("phase_anchor_time", self.phase_anchor_time, "phases are counted from one epoch for so long, s");
+    field("camera", self.camera, "motions between images are expected");
+    field("camera_mounting_sigma", self.camera_mounting_sigma,
+          "of the calibrated rotation of the camera on the body, per axis, rad");
+    field("camera_inflation", self.camera_inflation, "of the variance that a motion between images claims");
+    field("camera_gyroscope_noise", self.camera_gyroscope_noise,
+          "least white noise of the gyroscopes where motions between images are expected, rad/s/sqrt(Hz)");
     field("gate_probability_3", self.gate_probability_3, "chi-square gate, 3 degrees of freedom");
     field("gate_probability_2", self.gate_probability_2, "chi-square gate, 2 degrees of freedom");
     field("gate_probability_1", self.gate_probability_1, "chi-square gate, 1 degree of freedom");

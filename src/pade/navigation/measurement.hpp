@@ -9,6 +9,7 @@
 #include "pade/core/lie.hpp"
 #include "pade/core/sensors/measurements.hpp"
 #include "pade/core/time.hpp"
+#include "pade/navigation/camera/camera_motion.hpp"
 
 namespace pade::navigation {
 
@@ -40,8 +41,8 @@ enum class Verdict : std::uint8_t {
 
 /// Innovation of one measurement; unused components are zero.
 struct Innovation {
-  Verdict verdict = Verdict::unusable;   ///< what became of it
-  int size = 0;                          ///< components that are used, 0 to 3
+  Verdict verdict = Verdict::unusable;  ///< what became of it
+  int size = 0;  ///< components that are used, 0 to 3; of a camera 0 to 5, the rotation is kept below
   Vector3d residual = Vector3d::Zero();  ///< measured less predicted, in the unit of the measurement
   Vector3d sigma = Vector3d::Zero();     ///< predicted, before any inflation
   Vector3d white = Vector3d::Zero();     ///< the residual in units of its predicted covariance, S^(-1/2) r
@@ -62,10 +63,11 @@ enum class SensorKind : std::uint8_t {
   zero_velocity,
   range,
   road,
-  raw_gnss
+  raw_gnss,
+  camera
 };
 inline constexpr std::size_t sensor_kinds =
-    static_cast<std::size_t>(SensorKind::raw_gnss) + 1;  ///< raw_gnss is the last
+    static_cast<std::size_t>(SensorKind::camera) + 1;  ///< camera is the last
 
 /// A measurement of any kind.
 struct Measurement {
@@ -76,7 +78,8 @@ struct Measurement {
   double sigma = 0;                             ///< the others
   double extra = 0;                             ///< ground height of a range
   std::shared_ptr<const RawEpoch> raw;          ///< raw GNSS only, and then not null
-  Innovation innovation;                        ///< of its last use by the live filter
+  std::shared_ptr<const CameraMotion> camera;  ///< camera only; null: an image from which one may be measured
+  Innovation innovation;                       ///< of its last use by the live filter
 
   Measurement() = default;
   /// @{
@@ -97,6 +100,8 @@ struct Measurement {
   explicit Measurement(const RoadMotion& m) : time(m.time), kind(SensorKind::road), sigma(m.sigma) {}
   Measurement(std::shared_ptr<const RawEpoch> epoch, Time stamp)
       : time(stamp), kind(SensorKind::raw_gnss), raw(std::move(epoch)) {}
+  Measurement(std::shared_ptr<const CameraMotion> motion, Time stamp)
+      : time(stamp), kind(SensorKind::camera), camera(std::move(motion)) {}
   /// @}
 };
 

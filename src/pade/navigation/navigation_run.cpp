@@ -65,20 +65,26 @@ NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOption
     for (; next < frames.size() && frames[next].nanoseconds + offset <= now.nanoseconds; ++next) {
       const Time t = frames[next];
       const auto pose = navigator.absolute_pose(t);
+      navigation::RelativePose motion;
       if (pose.answer != Answer::valid) {
         ++run.health.frames_without_answer;
-        continue;
+      } else {
+        if (next > 0 && !run.frames.empty() && run.frames.back().time == frames[next - 1]) {
+          motion = navigator.relative_pose(frames[next - 1], t, options.T_body_camera);
+          if (motion.answer == Answer::valid) run.motions.push_back({frames[next - 1], t, motion});
+        }
+        run.frames.push_back({t, pose, navigator.health().status});
       }
-      if (next > 0 && !run.frames.empty() && run.frames.back().time == frames[next - 1]) {
-        const auto motion = navigator.relative_pose(frames[next - 1], t, options.T_body_camera);
-        if (motion.answer == Answer::valid) run.motions.push_back({frames[next - 1], t, motion});
-      }
-      run.frames.push_back({t, pose, navigator.health().status});
+      // Behind the answer: what a frame is told has nothing of its own image.
+      if (!options.camera || next == 0) continue;
+      if (const auto seen = options.camera(frames[next - 1], t, motion)) navigator.add(*seen);
     }
   });
   run.health.frames_without_answer += frames.size() - next;
   run.health.filter = navigator.health();
   run.raw = navigator.raw_tally();
+  run.camera = navigator.camera_tally();
+  run.camera_mounting = navigator.camera_mounting();
   run.health.sensors = navigation::summarise(run.measurements);
   count_frames(run);
   return run;

@@ -2,8 +2,10 @@
 // health; and the poses of a camera that follow from it.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pade/core/hint.hpp"
@@ -22,6 +24,12 @@ struct NavigationRunOptions {
   std::vector<std::shared_ptr<const navigation::RawEpoch>>
       raw;               ///< raw GNSS beside the log's own; none is null
   bool on_road = false;  ///< a vehicle on wheels, which moves along its x axis only
+  /// Looks at the images of two neighbouring frames, when the later one has come, and says what they show of
+  /// the motion, if anything: it goes into the filter (FilterOptions::camera). It is told the motion that the
+  /// filter then knows, which has no answer before the filter has started. Empty: no camera.
+  std::function<std::optional<navigation::CameraMotion>(Time t1, Time t2,
+                                                        const navigation::RelativePose& known)>
+      camera;
 };
 
 /// The state at one frame.
@@ -43,7 +51,10 @@ struct NavigationRun {
   std::vector<FrameMotion> motions;                   ///< of neighbouring frames with an answer
   std::vector<navigation::Measurement> measurements;  ///< each with its last innovation
   NavigationHealth health;
-  navigation::RawTally raw;  ///< of raw GNSS
+  navigation::RawTally raw;        ///< of raw GNSS
+  navigation::CameraTally camera;  ///< of the camera's motions
+  Eigen::Quaterniond camera_mounting =
+      Eigen::Quaterniond::Identity();  ///< Navigator::camera_mounting() at the end
 };
 
 /// Plays the whole log in the order of its stamps. Every frame is answered causally, as in flight.
@@ -60,6 +71,7 @@ struct CameraTrajectory {
   std::optional<GeodeticOrigin> origin;  ///< of the world, where the GNSS log has one
   NavigationHealth health;               ///< of the run
   std::vector<Hint> hints;               ///< of log and run, worst first; filled by who knows the log
+  std::vector<std::string> notes;        ///< what became of the camera, if it was fed back; likewise
 };
 
 /// The longest unbroken chain of a run's motions as poses of the camera. The first pose is the filter's own;

@@ -55,12 +55,16 @@ class Navigator::Core {
 
   void add(const ImuSample& sample);
   void add(Measurement measurement, double latency, bool finite);
+  void add(const CameraMotion& motion);
   RelativePose relative_pose(Time t1, Time t2, const Pose& T_body_camera);
   AbsolutePose absolute_pose(Time t);
   Health health();
   [[nodiscard]] const NavigatorOptions& options() const { return options_; }
   [[nodiscard]] RawTally raw_tally() const {
     return phase_ == AlignmentPhase::aligned ? live_.core().raw.tally : RawTally{};
+  }
+  [[nodiscard]] CameraState camera() const {
+    return phase_ == AlignmentPhase::aligned ? live_.core().camera : CameraState{};
   }
   [[nodiscard]] Time newest() const { return newest_; }
   void on_retired(std::function<void(const Measurement&)> sink) { sink_ = std::move(sink); }
@@ -73,6 +77,7 @@ class Navigator::Core {
   };
 
   void advance_live(Time to);
+  void replay_from(Time time);
   void restart();
   void restart_if_hopeless();
   bool load_scratch(Time t, Answer& answer);
@@ -184,15 +189,57 @@ void Navigator::Core::add(Measurement measurement, double latency, bool finite) 
     return;
   }
   timeline_.measurements.insert(*place, measurement);
-  if (!aligned || measurement.time > live_.state().time) return;
-  while (keyframes_.back().time >= measurement.time) keyframes_.pop_back();
+  if (aligned) replay_from(measurement.time);
+}
+
+/// Uses what has been put into the timeline at a time that the filter has passed.
+void Navigator::Core::replay_from(Time time) {
+  if (time > live_.state().time) return;
+  while (keyframes_.back().time >= time) keyframes_.pop_back();
   live_.restore(keyframes_.back().snapshot);
   advance_live(newest_);
 }
 
+void Navigator::Core::add(const CameraMotion& motion) {
+  if (!options_.filter.camera || !is_usable(motion)) {
+    ++health_.unusable;
+    return;
+  }
+  auto stamped = std::make_shared<CameraMotion>(motion);
+  stamped->t1 = imu_time(motion.t1);
+  stamped->t2 = imu_time(motion.t2);
+  auto& all = timeline_.measurements;
+  const Measurement mark(std::shared_ptr<const CameraMotion>(), stamped->t1);
+  const Measurement measured(stamped, stamped->t2);
+  const bool aligned = phase_ == AlignmentPhase::aligned;
+  // An image at t1 that ends no motion has to be marked, and the filter to go back to it.
+  const auto marked = timeline_.place_of(mark);
+  const Time first = marked ? mark.time : measured.time;
+  if (aligned && first <= keyframes_.front().time) {
+    ++health_.too_late;
+    return;
+  }
+  if (const auto place = timeline_.place_of(measured)) {
+    all.insert(*place, measured);
+  } else {
+    // At t2 stands the mark of a later motion that came before this one, or this motion.
+    std::size_t at = all.count_until(measured.time) - 1;
+    while (all[at].kind != SensorKind::camera) --at;
+    if (all[at].camera) {
+      ++health_.duplicates;
+      return;
+    }
+    all[at].camera = stamped;
+  }
+  if (const auto place = timeline_.place_of(mark)) all.insert(*place, mark);
+  if (aligned) replay_from(first);
+}
+
 void Navigator::Core::retire(Time before) {
   while (!timeline_.measurements.empty() && timeline_.measurements.front().time < before) {
-    if (sink_) sink_(timeline_.measurements.front());
+    const Measurement& oldest = timeline_.measurements.front();
+    const bool is_mark = oldest.kind == SensorKind::camera && !oldest.camera;
+    if (sink_ && !is_mark) sink_(oldest);
     timeline_.measurements.pop_front();
   }
 }
@@ -235,21 +282,18 @@ RelativePose Navigator::Core::relative_pose(Time t1, Time t2, const Pose& T_body
   if (!load_scratch(t1, result.answer)) return result;
   const int clone = scratch_.clone();
   timeline_.advance(scratch_, t2);
-  const CloneMotion body = scratch_.motion_since(clone);
+  const CloneMotion camera = scratch_.camera_motion_since(clone, T_body_camera);
   result.status = status_of(scratch_);
 
-  const Pose T_camera_body = T_body_camera.inverse();
-  const Pose T = T_camera_body * body.T_1_2 * T_body_camera;
+  const Pose& T = camera.T_1_2;
   const Matrix3d R = T.matrix3();
-  // ξ of the body at t2 to ξ of the camera, then from the axes of the second frame to those of the first.
-  const Matrix6d Ad = adjoint(T_camera_body);
-  const Matrix6d local = Ad * body.covariance * Ad.transpose();
+  // From the axes of the second frame to those of the first.
   Matrix6d turn = Matrix6d::Zero();  // (rotation, translation) -> (translation, rotation)
   turn.topRightCorner<3, 3>() = turn.bottomLeftCorner<3, 3>() = R;
   result.motion.R_reference_other = R;
   result.motion.t_reference_other = T.translation;
   result.motion.duration = seconds_between(t1, t2);
-  result.motion.covariance = turn * local * turn.transpose();
+  result.motion.covariance = turn * camera.covariance * turn.transpose();
   const double baseline = T.translation.norm();
   const BaselineSigmas sigma = baseline_sigmas(T.translation, result.motion.covariance.topLeftCorner<3, 3>());
   const bool lost = scratch_.core().integrity.lost;  // then the covariance is refuted
@@ -367,12 +411,16 @@ void Navigator::add(std::shared_ptr<const RawEpoch> measurement) {
   core_->add(Measurement(std::move(measurement), time), core_->options().gnss_position_latency, true);
 }
 
+void Navigator::add(const CameraMotion& measurement) { core_->add(measurement); }
+
 RelativePose Navigator::relative_pose(Time t1, Time t2, const Pose& T_body_camera) {
   return core_->relative_pose(t1, t2, T_body_camera);
 }
 AbsolutePose Navigator::absolute_pose(Time t) { return core_->absolute_pose(t); }
 Health Navigator::health() { return core_->health(); }
 RawTally Navigator::raw_tally() const { return core_->raw_tally(); }
+CameraTally Navigator::camera_tally() const { return core_->camera().tally; }
+Quaterniond Navigator::camera_mounting() const { return core_->camera().mounting; }
 Time Navigator::newest() const { return core_->newest(); }
 void Navigator::on_retired(std::function<void(const Measurement&)> sink) {
   core_->on_retired(std::move(sink));

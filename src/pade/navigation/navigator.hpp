@@ -129,6 +129,10 @@ class Navigator {
   /// Raw GNSS, of which the options say that it is expected (FilterOptions::raw_gnss); else its position and
   /// velocity are used. Null is passed over.
   void add(std::shared_ptr<const RawEpoch> measurement);
+  /// The motion between two images, when these have been looked at: after t2, within the history. The options
+  /// say that it is expected (FilterOptions::camera); else, or if it makes no sense, it counts as unusable.
+  /// It takes effect at t2. Each call allocates a little.
+  void add(const CameraMotion& measurement);
   /// @}
 
   /// Motion of the camera from image time t1 to image time t2 (t2 >= t1), from a clone at t1 within a replay
@@ -141,6 +145,10 @@ class Navigator {
   [[nodiscard]] Health health();
   /// What became of raw GNSS, satellite by satellite, since the last start of the filter.
   [[nodiscard]] RawTally raw_tally() const;
+  /// What became of the camera's motions, since the last start of the filter.
+  [[nodiscard]] CameraTally camera_tally() const;
+  /// R_calibrated_camera: how the camera's mounting differs from its calibration, as far as is known.
+  [[nodiscard]] Quaterniond camera_mounting() const;
   [[nodiscard]] Time newest() const;  ///< of the IMU samples
   /// Called with each measurement when it leaves the history, with the innovation of its last use.
   void on_retired(std::function<void(const Measurement&)> sink);

@@ -20,6 +20,8 @@ Innovation apply(Filter& filter, const Measurement& m, double declination) {
       return filter.update(RoadMotion{m.time, m.sigma});
     case SensorKind::raw_gnss:
       return filter.update(*m.raw);
+    case SensorKind::camera:
+      return m.camera ? filter.update(*m.camera) : filter.mark_image();
     case SensorKind::range:
       return filter.update(RangeToGround{m.time, m.value.x(), m.sigma, m.extra});
   }

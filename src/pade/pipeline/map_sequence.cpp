@@ -46,6 +46,15 @@ double masked_share(const cv::Mat& mask) {
   return 1 - static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
 }
 
+/// For images that have none yet.
+Result<io::ComputedPoses> no_poses(const std::filesystem::path& /*folder*/, const std::vector<Time>& images,
+                                   const io::Calibration& /*calibration*/) {
+  io::ComputedPoses none;
+  for (const Time time : images) none.poses.push_back({time, {}});
+  none.covariances.assign(images.size(), Matrix6d::Zero());
+  return none;
+}
+
 /// Reads frames in order, with a second thread one frame ahead.
 class Reader {
  public:
@@ -285,9 +294,28 @@ Status read_options(std::string_view text, std::string_view file, MapSequenceOpt
 }
 
 Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options) {
+  const bool fed = options.navigation.filter.camera;
+  if (fed && options.sequence.poses != poses_from_sensors) {
+    return Error{fmt::format(
+        "navigation.filter.camera (--feed-camera) is on and the poses are {}, expected {}: nothing else "
+        "has a filter to feed",
+        options.sequence.poses, poses_from_sensors)};
+  }
+  if (fed && !options.mapper.refinement.on) {
+    return Error{
+        "navigation.filter.camera (--feed-camera) is on and mapper.refinement.on (--refine-motion) is off, "
+        "expected on: it is the refinement that finds the motion"};
+  }
   if (options.sequence.poses != poses_from_sensors) return io::Sequence::open(folder, options.sequence);
+  const std::string& topics = options.sequence.topics;
+  if (!fed)
+    return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation, topics));
+  // First for the images alone, of which the filter has yet to say which ones have a pose.
+  const auto images = io::Sequence::open(folder, options.sequence, no_poses);
+  if (!images) return images.error();
+  const FedImages looked_at{*images, options.mapper.refinement};
   return io::Sequence::open(folder, options.sequence,
-                            poses_from_imu_gnss(options.navigation, options.sequence.topics));
+                            poses_from_imu_gnss(options.navigation, topics, &looked_at));
 }
 
 Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,

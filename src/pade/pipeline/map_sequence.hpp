@@ -53,7 +53,9 @@ Status read_options(std::string_view text, std::string_view file, MapSequenceOpt
 /// The class of the IMU, and the filter's options for it.
 void set_imu(MapSequenceOptions& options, navigation::ImuClass imu);
 
-/// Opens a sequence with the poses that the options ask for: read from a file, or from-imu-gnss.
+/// Opens a sequence with the poses that the options ask for: read from a file, or from-imu-gnss, for which
+/// the images are looked at first if navigation.filter.camera says so. Error also if it does with poses of
+/// another source, or with mapper.refinement.on off.
 Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options);
 
 /// How far a run is.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pade/core/result.hpp"
+#include "pade/depth/motion/motion_refinement.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/navigation/navigation_run.hpp"
 
@@ -19,14 +20,22 @@ struct CameraMounting {
   std::optional<Eigen::Vector3d> gnss_lever_arm;  ///< body, m; else what the GNSS log says
 };
 
+/// Images whose motion the filter takes in.
+struct FedImages {
+  const io::Sequence& sequence;               ///< every image, whatever its pose; must outlive the use
+  depth::MotionRefinementOptions refinement;  ///< how they are looked at
+};
+
 /// Runs the filter on imu.csv and gnss.csv (and baro.csv, mag.csv) of a sequence folder and chains its
-/// motions (camera_trajectory()). Frames before the filter knows its yaw have no pose. Errors: a log that
+/// motions (camera_trajectory()). Frames before the filter knows its yaw have no pose. With `images` and
+/// FilterOptions::camera what they show of each motion goes into the filter behind it. Errors: a log that
 /// cannot be read; no frame with a pose.
 Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
                                                          const std::vector<Time>& frames,
                                                          const CameraMounting& mounting,
                                                          const navigation::NavigatorOptions& options = {},
-                                                         const std::string& topics = {});
+                                                         const std::string& topics = {},
+                                                         const FedImages* images = nullptr);
 
 /// What a person should know of the trajectory: motions of doubtful length and direction, and frames left
 /// out.
@@ -37,8 +46,8 @@ inline constexpr const char* poses_from_sensors = "from-imu-gnss";
 
 /// The same as a source of poses for io::Sequence. Errors: those of the function above; no GNSS data; a
 /// calibration without T_body_camera.
-/// @param topics  of a recording (io::NavigationLogOptions::topics)
+/// @param topics  of a recording (io::NavigationLogOptions::topics). @param images  null: none is fed back
 io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options,
-                                   const std::string& topics = {});
+                                   const std::string& topics = {}, const FedImages* images = nullptr);
 
 }  // namespace pade

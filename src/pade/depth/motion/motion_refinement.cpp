@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "pade/core/compute/median.hpp"
 
@@ -221,6 +222,38 @@ Eigen::Matrix3d turn_gain(const Matrix6d& root, const Matrix6d& posterior) {
       .bottomRightCorner<3, 3>();
 }
 
+/// What the flow alone tells: its normal equations at the refined motion, in units of the prior, are turned
+/// into those of direction and rotation, and solved without the prior.
+ImageMotion images_alone(const Measurement& flow, const Matrix6d& root, const Eigen::Matrix3d& turned,
+                         const RelativeMotion& refined) {
+  constexpr double kUntold = 0.3;  // rad
+  const double length = refined.t_reference_other.norm();
+  if (!(root.diagonal().minCoeff() > 0) || !(length > 0)) return {};
+  ImageMotion out;
+  out.direction = refined.t_reference_other / length;
+  // z = back (direction, rotation): z = S^-1 (dt, dtheta), dt turned back and of the baseline's length.
+  Matrix6d across = Matrix6d::Identity();
+  across.topLeftCorner<3, 3>() =
+      length * turned.transpose() * (Eigen::Matrix3d::Identity() - out.direction * out.direction.transpose());
+  const Matrix6d back = root.triangularView<Eigen::Lower>().solve(across);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(back.transpose() * flow.information * back);
+  const Vector6d gradient = back.transpose() * flow.gradient;
+  Vector6d step = Vector6d::Zero();
+  for (int i = 0; i < 6; ++i) {
+    const double told = parts.eigenvalues()[i];
+    if (!(told * kUntold * kUntold > 1)) continue;
+    const Vector6d axis = parts.eigenvectors().col(i);
+    out.information += told * axis * axis.transpose();
+    step -= axis * (axis.dot(gradient) / told);
+  }
+  out.R_reference_other =
+      rotation_exp(Eigen::Vector3d(step.tail<3>())).toRotationMatrix() * refined.R_reference_other;
+  out.direction = (out.direction + step.head<3>()).normalized();
+  across.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() - out.direction * out.direction.transpose();
+  out.information = (across * out.information * across).eval();
+  return out;
+}
+
 RefinedMotion unchanged(const RelativeMotion& prior, RefinementOutcome outcome, RefinedMotion so_far = {}) {
   so_far.motion = prior;
   so_far.outcome = outcome;
@@ -415,6 +448,8 @@ RefinedMotion MotionRefiner::refine(const RefinementInput& input) {
   turn.topLeftCorner<3, 3>() = chart.turn(step);
   const Matrix6d covariance = turn * root * posterior * root.transpose() * turn.transpose();
   out.motion.covariance = 0.5 * (covariance + covariance.transpose());
+  out.images = images_alone(measurement(sums, floor, options_.inflation, flow.correlation), root,
+                            chart.turn(step), out.motion);
   out.outcome = RefinementOutcome::refined;
   state_length_and_direction(out);
   return out;

@@ -57,6 +57,16 @@ enum class RefinementOutcome {
                    ///< fills the view, or the prior's covariance is too small
 };
 
+/// Rotation and direction of translation as the images alone show them, without the prior.
+struct ImageMotion {
+  Eigen::Matrix3d R_reference_other = Eigen::Matrix3d::Identity();  ///< directions: other -> reference
+  Eigen::Vector3d direction =
+      Eigen::Vector3d::Zero();  ///< of t_reference_other, norm 1; zero if none was found
+  /// Inverse covariance of (direction, rotation vector) in the order and axes of RelativeMotion::covariance,
+  /// rad^-2. What the images hardly tell has zeros: there the motion is that of the prior.
+  Matrix6d information = Matrix6d::Zero();
+};
+
 /// Motion of the pair, and how it was found. If `outcome` is not `refined`, the motion is the prior.
 struct RefinedMotion {
   RelativeMotion motion;                               ///< with its 6x6 covariance
@@ -75,6 +85,8 @@ struct RefinedMotion {
   /// What `turn` shows of a true error of the prior's rotation: the identity where the images know all of it,
   /// zero where the prior alone speaks.
   Eigen::Matrix3d turn_gain = Eigen::Matrix3d::Zero();
+  /// For a filter that knows the prior already; empty unless `refined`, or where the prior is partly exact.
+  ImageMotion images{};
 };
 
 /// What a pair of frames gives to the refinement.

@@ -89,6 +89,8 @@ void Filter::shift_common_position(const Matrix3d& covariance) {
   Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMaxState, 3> G = decltype(G)::Zero(size(), 3);
   G.middleRows<3>(kRho) = core_.state.X.R.toRotationMatrix().transpose();
   if (options_.raw_gnss) G.middleRows<3>(kAnchorPosition).setIdentity();
+  if (options_.camera)
+    G.middleRows<3>(camera_at() + kAnchorPose + 3) = core_.camera.anchor.matrix3().transpose();
   for (int i = 0; i < clones_; ++i) {
     G.middleRows<3>(clone_at(i) + 3) = clone_poses_[static_cast<std::size_t>(i)].matrix3().transpose();
   }

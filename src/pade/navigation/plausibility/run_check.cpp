@@ -34,6 +34,8 @@ const char* name_of(SensorKind kind) {
       return "road";
     case SensorKind::raw_gnss:
       return "raw_gnss";
+    case SensorKind::camera:
+      return "camera";
   }
   return "";
 }
