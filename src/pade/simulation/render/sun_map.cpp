@@ -93,7 +93,7 @@ void SunMap::project_triangles() {
                    [](const Shade& a, const Shade& b) { return a.highest > b.highest; });
 }
 
-SunMap::Patch SunMap::patch_of(const Shade& shade) const {
+SunMap::Patch SunMap::patch_of(const Shade& shade) {
   Patch patch;
   for (std::size_t k = 0; k < 3; ++k)
     patch.extend({static_cast<double>(shade.x[k]), static_cast<double>(shade.y[k]),

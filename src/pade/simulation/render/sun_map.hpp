@@ -50,7 +50,7 @@ class SunMap {
     [[nodiscard]] double size() const { return (high - low).maxCoeff(); }
   };
 
-  [[nodiscard]] Patch patch_of(const Shade& shade) const;
+  [[nodiscard]] static Patch patch_of(const Shade& shade);
   [[nodiscard]] std::vector<Patch> patches_of(const Quadric& quadric) const;
   void project_triangles();
   void lay_out(const Patch& all);
