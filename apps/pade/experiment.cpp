@@ -15,6 +15,7 @@
 #include "pade/io/text.hpp"
 #include "pade/paper/experiment/experiment_run.hpp"
 #include "pade/paper/tables/experiment_finish.hpp"
+#include "pade/paper/verdicts/flight_verdict.hpp"
 
 #include "cache.hpp"
 #include "commands.hpp"
@@ -42,6 +43,7 @@ struct ExperimentArguments {
   std::string out;
   std::string set;
   std::string shard;
+  std::string flights;  // of tables: the grid.json of flights
   std::vector<std::string> flows;
   PlanOptions plan;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -124,6 +126,22 @@ Status finish(const ExperimentArguments& arguments, const Experiment& experiment
   return {};
 }
 
+/// --flights into the plan, so that shards and later calls know them.
+Status take_flights(const ExperimentArguments& arguments, PlanOptions& plan) {
+  if (arguments.flights.empty()) return {};
+  const std::vector<std::string> made = experiment::words(plan.tables);
+  if (std::none_of(made.begin(), made.end(), [](const auto& t) { return t == "table1" || t == "figure3"; }))
+    return Error{fmt::format(
+        "--flights: found with {}, expected with all, table1 or figure3 (verdicts are made there)",
+        plan.tables)};
+  const auto text = io::read_file(arguments.flights);
+  if (!text) return text.error();
+  const auto flights = evaluation::flights_of_grid(*text, arguments.flights);
+  if (!flights) return flights.error();
+  plan.flights = evaluation::text_of(*flights);
+  return {};
+}
+
 Status run_tables(const ExperimentArguments& arguments) {
   if (!std::isfinite(arguments.plan.range))
     return Error{fmt::format("--range: found {}, expected metres above 0", arguments.plan.range)};
@@ -137,6 +155,7 @@ Status run_tables(const ExperimentArguments& arguments) {
   PlanOptions plan = arguments.plan;
   if (arguments.what != "all") plan.tables = arguments.what;
   plan.flows = fmt::format("{}", fmt::join(arguments.flows, ","));
+  if (const Status s = take_flights(arguments, plan); !s) return s;
   if (arguments.quick) plan.source = "--quick";
   std::vector<fs::path> folders(arguments.sequences.begin(), arguments.sequences.end());
   if (folders.empty()) {
@@ -162,8 +181,9 @@ Status run_tables(const ExperimentArguments& arguments) {
 Status merge(const ExperimentArguments& arguments) {
   if (arguments.folders.empty()) return Error{"merge: found no folder, expected those of the shards"};
   std::vector<fs::path> folders(arguments.folders.begin(), arguments.folders.end());
-  const auto experiment = experiment::merged_experiment(folders);
+  auto experiment = experiment::merged_experiment(folders);
   if (!experiment) return experiment.error();
+  if (const Status s = take_flights(arguments, experiment->options); !s) return s;
   const auto store = Store::open(arguments.out, arguments.force);
   if (!store) return store.error();
   if (Status s = store->write_file(experiment::plan_file, experiment::to_json(*experiment)); !s) return s;
@@ -174,8 +194,10 @@ Status merge(const ExperimentArguments& arguments) {
 /// Of the options, those of tables do not belong here.
 Status fly([[maybe_unused]] const ExperimentArguments& arguments) {
 #ifdef PADE_HAS_SIMULATION
-  if (!arguments.sequences.empty() || !arguments.set.empty() || !arguments.flows.empty())
-    return Error{"fly: found --sequences, --set or --flow, expected none of them (they are of the tables)"};
+  if (!arguments.sequences.empty() || !arguments.set.empty() || !arguments.flows.empty() ||
+      !arguments.flights.empty())
+    return Error{
+        "fly: found --sequences, --set, --flow or --flights, expected none of them (they are of the tables)"};
   const auto share = share_of(arguments);
   if (!share) return share.error();
   GridOptions options;
@@ -217,6 +239,7 @@ void add_experiment(CLI::App& app, Context& context) {
       "  pade experiment table1 --sequences DATA/redkitchen_sideways --step 2 --out kitchen\n"
       "  pade experiment all --shard 1/3 --out part1   (and 2/3, 3/3), then\n"
       "  pade experiment merge part1 part2 part3 --out results\n"
+      "  pade experiment all --flights flights/grid.json --out results   (with the verdict on flying)\n"
       "  pade experiment fly chain gust --out flights --jobs 2   (--shard 1/3 too; the table by the same "
       "command without it)\n"
       "docs/experiments.md tells more.");
@@ -250,6 +273,8 @@ void add_experiment(CLI::App& app, Context& context) {
   command->add_option("--jobs", a->jobs, "jobs at a time; the result is the same")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  command->add_option("--flights", a->flights,
+                      "grid.json of `pade experiment fly`, for the verdict on autonomous flight");
   command->add_option("--shard", a->shard, "i/n: only the i-th of n shares of the jobs");
   command->add_flag("--force", a->force, "make the tables of a finished experiment again");
   command->add_flag("--json", a->json, "print experiment.json instead of the tables");

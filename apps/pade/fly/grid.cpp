@@ -12,11 +12,13 @@
 
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/text.hpp"
+#include "pade/paper/verdicts/flight_verdict.hpp"
 #include "pade/pipeline/depth_from.hpp"
 
 #include "../progress.hpp"
 #include "fleet.hpp"
 #include "flight_files.hpp"
+#include "grid_timing.hpp"
 
 namespace pade::cli {
 namespace {
@@ -238,6 +240,16 @@ Status write_cell(const fs::path& folder, const Fleet& fleet) {
   return io::write_file(folder / "report.html", fleet_page(all), io::Overwrite::replace);
 }
 
+/// On the paper's outlook, where enough was flown to judge it.
+std::string verdict_text(const std::string& json) {
+  const auto flown = evaluation::flights_of_grid(json, "grid.json");
+  if (!flown) return {};
+  const evaluation::Verdict verdict = evaluation::judge_flights(*flown);
+  if (verdict.outcome == evaluation::Outcome::not_tested) return {};
+  return fmt::format("\n\"{}\" (the paper, {}): {}. {}\n", verdict.claim, verdict.where,
+                     evaluation::outcome_name(verdict.outcome), verdict.sense);
+}
+
 Result<std::vector<Configuration>> chosen(const GridOptions& options) {
   const std::vector<Configuration> all = all_configurations();
   std::vector<std::string> names = options.configurations;
@@ -304,9 +316,13 @@ Status fly_grid(const GridOptions& options) {
     return {};
   }
   std::vector<Row> cells_flown;
+  std::vector<TimedFlights> timed;
   for (std::size_t i = 0; i < fleets.size(); ++i) {
     const FleetOptions& fleet = made[i].second;
     if (const Status s = write_cell(fleet.out, fleets[i]); !s) return s;
+    TimedFlights& flights = timed.emplace_back(TimedFlights{made[i].first->name, fleet.place.name, {}});
+    for (const ordered_json& f : fleets[i].flown())
+      flights.folders.push_back(fleet.out / std::to_string(f["seed"].get<std::uint64_t>()));
     cells_flown.push_back(
         {made[i].first->name, fleet.place.name, fleet.place.density, fleets[i].flown(), fleets[i].refused()});
   }
@@ -314,9 +330,15 @@ Status fly_grid(const GridOptions& options) {
   for (const Row& row : with_pools(cells_flown)) rows.push_back(row_of(row));
   const std::string json = rows.dump(2) + "\n";
   if (const Status s = io::write_file(options.out / "grid.json", json, io::Overwrite::replace); !s) return s;
-  const std::string table = table_of(rows);
+  const std::string table = table_of(rows) + verdict_text(json);
   if (const Status s = io::write_file(options.out / "grid.md", table, io::Overwrite::replace); !s) return s;
-  fmt::print("{}", options.json ? json : table);
+  const auto timing = timing_of(timed);
+  if (!timing) return timing.error();
+  if (const Status s =
+          io::write_file(options.out / "timing.json", timing->dump(2) + "\n", io::Overwrite::replace);
+      !s)
+    return s;
+  fmt::print("{}", options.json ? json : fmt::format("{}\n{}", table, timing_text(*timing)));
   return {};
 }
 

@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pade/core/random.hpp"
+#include "pade/paper/verdicts/flight_verdict.hpp"
 #include "pade/paper/verdicts/verdict_evidence.hpp"
 
 namespace pade::evaluation {
@@ -217,7 +218,7 @@ TEST(Verdicts, WithoutNoiseOnSpeedAloneItsPartIsNotJudged) {
 TEST(Verdicts, EachSaysWhereThePaperClaimsIt) {
   auto verdicts = judge_accuracy(rows_of(papers_world()));
   for (const Verdict& verdict : judge_speed({})) verdicts.push_back(verdict);
-  EXPECT_EQ(verdicts.size(), 24U);
+  EXPECT_EQ(verdicts.size(), 23U);
   for (const Verdict& verdict : verdicts) {
     EXPECT_FALSE(verdict.claim.empty() || verdict.where.empty() || verdict.sense.empty()) << verdict.claim;
     EXPECT_EQ(std::count_if(verdicts.begin(), verdicts.end(),
@@ -279,7 +280,8 @@ TEST(ChangedOutcomes, AreThoseThatDiffer) {
 }
 
 TEST(VerdictJson, HoldsWhatTheVerdictSays) {
-  const auto verdicts = judge_accuracy(rows_of(papers_world()));
+  auto verdicts = judge_accuracy(rows_of(papers_world()));
+  verdicts.push_back(judge_flights({}));
   const auto json = nlohmann::json::parse(to_json(verdicts));
   ASSERT_EQ(json.size(), verdicts.size());
   EXPECT_EQ(json[0]["claim"], verdicts[0].claim);

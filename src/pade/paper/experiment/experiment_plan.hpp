@@ -24,8 +24,9 @@ inline constexpr std::string_view ttc_exact = "ttc-exact";        ///< time to c
 
 struct PlanOptions {
   std::string tables = "table1,table2,figure3,figure4,windows,errata";  ///< comma-separated
-  std::string flows;   ///< comma-separated; empty = those of each table
-  std::string source;  ///< the words of the command line that chose the sequences
+  std::string flows;    ///< comma-separated; empty = those of each table
+  std::string source;   ///< the words of the command line that chose the sequences
+  std::string flights;  ///< how flights in a closed loop ended, as evaluation::flights_from_text() reads it
   int step = 1;
   double range = 20;
   int draws = 10;
@@ -37,6 +38,7 @@ struct PlanOptions {
     field("tables", self.tables, "what is made");
     field("flows", self.flows, "optical-flow methods; empty = those of each table");
     field("source", self.source, "options that chose the sequences");
+    field("flights", self.flights, "how flights in a closed loop ended: name:flights:arrived:collided, ...");
     field("step", self.step, "pairs each frame with the step-th before it");
     field("range", self.range, "farther depth counts as none, m");
     field("draws", self.draws, "of the noise of figure 3");

@@ -15,6 +15,7 @@
 #include "pade/paper/tables/experiment_report.hpp"
 #include "pade/paper/tables/experiment_tables.hpp"
 #include "pade/paper/tables/experiment_times.hpp"
+#include "pade/paper/verdicts/flight_verdict.hpp"
 #include "pade/report/report_pictures.hpp"
 
 namespace pade::experiment {
@@ -297,10 +298,13 @@ std::string text_of(const std::vector<Section>& sections) {
 Result<std::string> finish(const Experiment& experiment, const Store& store) {
   const auto results = read_results(experiment, store);
   if (!results) return results.error();
+  const auto flights = evaluation::flights_from_text(experiment.options.flights);
+  if (!flights) return flights.error();
   std::vector<Verdict> accuracy;
   std::vector<Verdict> speed;
   if (results->has("table1") || results->has("figure3"))
     accuracy = evaluation::judge_accuracy(error_rows(*results, pade_literal), verdict_options());
+  if (!accuracy.empty()) accuracy.push_back(evaluation::judge_flights(*flights));
   if (results->has("table2")) speed = evaluation::judge_speed(time_rows(*results), verdict_options());
   const auto sections = sections_of(*results, accuracy);
   const auto time_sections = time_sections_of(*results, speed);

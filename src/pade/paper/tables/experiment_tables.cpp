@@ -136,6 +136,7 @@ std::string command_of(const PlanOptions& options, std::string_view table) {
   if (options.range != usual.range) command += fmt::format(" --range {:g}", options.range);
   if (options.draws != usual.draws) command += fmt::format(" --draws {}", options.draws);
   if (options.seed != usual.seed) command += fmt::format(" --seed {}", options.seed);
+  if (!options.flights.empty()) command += " --flights FLIGHTS/grid.json";
   return command;
 }
 

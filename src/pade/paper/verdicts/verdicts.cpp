@@ -49,10 +49,10 @@ class AccuracyJudge {
   }
 
   [[nodiscard]] std::vector<Verdict> all() const {
-    return {ahead_near(),        ahead_with_lk(),  behind_far(),      inseparable(),    grows(),
-            lk_best_near(),      lk_best(),        comparable(),      less_sensitive(), slight_rise(),
-            ttc_rises(),         ttc_rises_far(),  more_robust(),     representative(), more_noticeable(),
-            speed_is_to_blame(), position_helps(), fit_for_autonomy()};
+    return {ahead_near(),        ahead_with_lk(), behind_far(),  inseparable(),    grows(),
+            lk_best_near(),      lk_best(),       comparable(),  less_sensitive(), slight_rise(),
+            ttc_rises(),         ttc_rises_far(), more_robust(), representative(), more_noticeable(),
+            speed_is_to_blame(), position_helps()};
   }
 
  private:
@@ -322,15 +322,6 @@ class AccuracyJudge {
     }
     return judge("Depth is better where the relative camera position is used", "5",
                  fmt::format("ADE of TTC less that of PADE, {}, 0-16 m [m]", mean_over_flows()), evidence);
-  }
-  static Verdict fit_for_autonomy() {
-    Verdict verdict;
-    verdict.claim = "PADE may serve safe autonomous flight in unknown places";
-    verdict.where = "abstract";
-    verdict.sense =
-        "An outlook: `pade experiment` flies nothing. `pade fly` does, by the chain that stands on it "
-        "(docs/fly.md).";
-    return verdict;
   }
 
   Errors errors_;
