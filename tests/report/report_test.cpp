@@ -13,6 +13,7 @@
 
 #include "pade/report/report_map.hpp"
 #include "pade/report/report_pictures.hpp"
+#include "pade/report/report_text.hpp"
 
 #include "evaluation/map/known_map.hpp"
 #include "evaluation/synthetic_depth.hpp"
@@ -312,6 +313,16 @@ INSTANTIATE_TEST_SUITE_P(WithUp, MapFromAbove,
                                          Up{"AgainstY", {0, -1, 0}, "x", "z"},
                                          Up{"Tilted", {0, 0.28, 0.96}, "x", "y′"}),
                          [](const auto& instance) { return instance.param.name; });
+
+/// What comes from names of files and lines of logs must not become part of the page.
+TEST(ReportText, TitlesAndRemarksAreTextAndNothingElse) {
+  const std::string remark = "line 3: <script>alert(1)</script> & more";
+  const std::string page = begin_page("a<b> \"flight\"", plot_page_style, {&remark, 1});
+  EXPECT_EQ(page.find("<b>"), std::string::npos);
+  EXPECT_EQ(page.find("<script"), std::string::npos);
+  EXPECT_NE(page.find("<title>a&lt;b&gt; &quot;flight&quot;</title>"), std::string::npos);
+  EXPECT_NE(page.find("<p>line 3: &lt;script&gt;alert(1)&lt;/script&gt; &amp; more</p>"), std::string::npos);
+}
 
 }  // namespace
 }  // namespace pade::evaluation

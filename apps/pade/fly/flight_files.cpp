@@ -15,7 +15,6 @@
 #include "pade/report/plot/plot.hpp"
 #include "pade/report/plot/route_picture.hpp"
 #include "pade/report/report_pictures.hpp"
-#include "pade/report/report_style.hpp"
 #include "pade/report/report_text.hpp"
 
 namespace pade::cli {
@@ -130,11 +129,8 @@ std::string tile(const std::string& value, std::string_view name) {
 }
 
 std::string page(const std::string& title, const std::string& body) {
-  return fmt::format(
-      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}"
-      ".map svg {{ width: 100%; height: auto; "
-      "}}</style></head><body><main>\n<h1>{}</h1>\n{}</main></body></html>\n",
-      evaluation::escape_html(title), evaluation::report_style, evaluation::escape_html(title), body);
+  return fmt::format("{}{}</main></body></html>\n",
+                     evaluation::begin_page(title, ".map svg { width: 100%; height: auto; }"), body);
 }
 
 std::string flight_page(const ordered_json& whole, const FlightTask& task, const ChainRecord& record,

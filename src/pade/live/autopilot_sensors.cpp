@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -24,18 +25,12 @@ constexpr double kMilliG = 9.80665e-3;
 constexpr double kMilli = 1e-3;
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::uint64_t kLastDate = 4'600'000'000'000'000;  // the year 2115, µs
-constexpr double kSlowestImu = 20;                          // Hz: what lies between slower samples is lost
 constexpr double kFieldSigma = 0.05;                        // as io::parse_magnetometer has it
 constexpr double kHeightSigma = 0.3;                        // m, as io::parse_barometer has it
 
 Vector3d flu_from_frd(const Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
 Time from_milliseconds(std::uint32_t ms) { return {static_cast<std::int64_t>(ms) * 1'000'000}; }
-
-template <class Sample>
-bool repeats(const std::vector<Sample>& samples, Time time) {
-  return !samples.empty() && samples.back().time == time;
-}
 
 /// By the median step, Hz; 0 if there are not two.
 double rate_of(const std::vector<ImuSample>& samples) {
@@ -49,10 +44,26 @@ double rate_of(const std::vector<ImuSample>& samples) {
   return *middle > 0 ? 1 / *middle : 0;
 }
 
-template <class Samples>
-const typename Samples::value_type& longest(const Samples& sources) {
-  return *std::max_element(sources.begin(), sources.end(),
-                           [](const auto& a, const auto& b) { return a.size() < b.size(); });
+template <class Channels>
+const auto& longest(const Channels& sources) {
+  return std::max_element(sources.begin(), sources.end(),
+                          [](const auto& a, const auto& b) { return a.samples.size() < b.samples.size(); })
+      ->samples;
+}
+
+/// Of the first source that ever had any; nothing stays of the others.
+template <class Channels>
+auto take_first(Channels& sources) {
+  decltype(sources[0].samples) taken;
+  bool found = false;
+  for (auto& source : sources) {
+    if (!found && source.last) {
+      found = true;
+      taken = std::move(source.samples);
+    }
+    source.samples.clear();
+  }
+  return taken;
 }
 
 }  // namespace
@@ -110,10 +121,11 @@ void SensorGatherer::add(const Frame& frame) {
 
 template <class Message>
 void SensorGatherer::add_integers(const Message& message, Time time, Source source) {
-  auto& samples = imu_[source];
-  if (repeats(samples, time)) return;
-  samples.push_back({time, flu_from_frd(kMilli * Vector3d(message.xgyro, message.ygyro, message.zgyro)),
-                     flu_from_frd(kMilliG * Vector3d(message.xacc, message.yacc, message.zacc))});
+  auto& channel = imu_[source];
+  if (!channel.is_new(time)) return;
+  channel.samples.push_back({time,
+                             flu_from_frd(kMilli * Vector3d(message.xgyro, message.ygyro, message.zgyro)),
+                             flu_from_frd(kMilliG * Vector3d(message.xacc, message.yacc, message.zacc))});
   add_field(time, kMilli * Vector3d(message.xmag, message.ymag, message.zmag), source);
 }
 
@@ -123,11 +135,10 @@ void SensorGatherer::add_highres(const Frame& frame) {
   if (!time || m->id != 0) return;
   const auto updated = [&](unsigned bits) { return (m->fields_updated & bits) != 0; };
   constexpr unsigned kInertial = 0x3f, kMagnetic = 0x1c0, kPressure = 0x200;
-  auto& samples = imu_[highres];
   const Vector3d rate = Eigen::Vector3f(m->xgyro, m->ygyro, m->zgyro).cast<double>();
   const Vector3d force = Eigen::Vector3f(m->xacc, m->yacc, m->zacc).cast<double>();
-  if (updated(kInertial) && !repeats(samples, *time) && rate.allFinite() && force.allFinite()) {
-    samples.push_back({*time, flu_from_frd(rate), flu_from_frd(force)});
+  if (updated(kInertial) && rate.allFinite() && force.allFinite() && imu_[highres].is_new(*time)) {
+    imu_[highres].samples.push_back({*time, flu_from_frd(rate), flu_from_frd(force)});
   }
   if (updated(kMagnetic)) {
     add_field(*time, Eigen::Vector3f(m->xmag, m->ymag, m->zmag).cast<double>(), highres);
@@ -136,15 +147,15 @@ void SensorGatherer::add_highres(const Frame& frame) {
 }
 
 void SensorGatherer::add_field(Time time, const Vector3d& frd, Source source) {
-  auto& samples = fields_[source];
-  if (repeats(samples, time) || !frd.allFinite() || frd.isZero(0)) return;
-  samples.push_back({time, flu_from_frd(frd), kFieldSigma});
+  auto& channel = fields_[source];
+  if (!frd.allFinite() || frd.isZero(0) || !channel.is_new(time)) return;
+  channel.samples.push_back({time, flu_from_frd(frd), kFieldSigma});
 }
 
 void SensorGatherer::add_pressure(std::optional<Time> time, double hectopascal, Source source) {
-  auto& samples = heights_[source];
-  if (!time || repeats(samples, *time) || !(hectopascal > 100 && hectopascal < 1200)) return;
-  samples.push_back({*time, io::height_of_pressure(hectopascal), kHeightSigma});
+  auto& channel = heights_[source];
+  if (!time || !(hectopascal > 100 && hectopascal < 1200) || !channel.is_new(*time)) return;
+  channel.samples.push_back({*time, io::height_of_pressure(hectopascal), kHeightSigma});
 }
 
 void SensorGatherer::add_fix(const Frame& frame) {
@@ -158,7 +169,7 @@ void SensorGatherer::add_fix(const Frame& frame) {
   }
   const bool on_earth =
       std::abs(static_cast<double>(m->lat)) <= 9e8 && std::abs(static_cast<double>(m->lon)) <= 1.8e9;
-  if (!time || !on_earth || repeats(fixes_, *time)) return;
+  if (!time || !on_earth || !fixes_.is_new(*time)) return;
   io::GeodeticFix fix{
       *time, 1e-7 * m->lat,       1e-7 * m->lon, kMilli * m->alt, kMilli * m->h_acc, kMilli * m->v_acc,
       {},    kMilli * m->vel_acc, false};
@@ -166,7 +177,11 @@ void SensorGatherer::add_fix(const Frame& frame) {
     const double course = 0.01 * m->cog * kDegree;
     fix.velocity = 0.01 * m->vel * Vector3d(std::sin(course), std::cos(course), 0);
   }
-  fixes_.push_back(fix);
+  fixes_.samples.push_back(fix);
+}
+
+NewSamples SensorGatherer::take() {
+  return {take_first(imu_), take_first(fields_), take_first(heights_), std::exchange(fixes_.samples, {})};
 }
 
 Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
@@ -183,20 +198,20 @@ Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
     return Error{fmt::format(
         "{}: the IMU is missing: found no HIGHRES_IMU, SCALED_IMU or ArduPilot's RAW_IMU of {}", name, who)};
   }
-  if (fixes_.empty()) {
+  if (fixes_.samples.empty()) {
     return Error{fmt::format(
         "{}: the GNSS is missing: found no GPS_RAW_INT with a fix in three dimensions, {} without", name,
         without_fix_)};
   }
-  if (const double rate = rate_of(log.imu); rate < kSlowestImu) {
+  if (const double rate = rate_of(log.imu); rate < slowest_imu) {
     return Error{fmt::format(
         "{}: the IMU is missing at a usable rate: found {} samples at {:.3g} Hz, expected {} Hz or more "
         "(ask for the message by MAV_CMD_SET_MESSAGE_INTERVAL, or raise SRx_RAW_SENS of ArduPilot)",
-        name, log.imu.size(), rate, kSlowestImu)};
+        name, log.imu.size(), rate, slowest_imu)};
   }
   log.magnetometer = longest(fields_);
   log.barometer = longest(heights_);
-  log.gnss = io::local_log(fixes_, "GPS_RAW_INT", log.remarks);
+  log.gnss = io::local_log(fixes_.samples, "GPS_RAW_INT", log.remarks);
   return log;
 }
 

@@ -17,6 +17,9 @@
 
 namespace pade::live {
 
+/// What lies between slower samples of an IMU is lost, Hz.
+inline constexpr double slowest_imu = 20;
+
 /// Who flies the vehicle.
 struct Autopilot {
   std::uint8_t system = 0;     ///< its number on the link
@@ -41,6 +44,14 @@ class BootClock {
   std::optional<std::int64_t> boot_since_1970_;  // µs
 };
 
+/// What has come since it was last asked for, each in the order of its arrival.
+struct NewSamples {
+  std::vector<ImuSample> imu;
+  std::vector<MagneticField> fields;
+  std::vector<BarometricHeight> heights;
+  std::vector<io::GeodeticFix> fixes;
+};
+
 /// Gathers IMU, GNSS, magnetometer and barometer from the messages of one autopilot. Samples that it repeats
 /// count once.
 ///
@@ -59,6 +70,12 @@ class SensorGatherer {
   /// @param name  stands in the message. Errors: the IMU or the GNSS is missing, or the IMU is too slow to
   ///              be integrated
   [[nodiscard]] Result<NavigationLog> log(const std::string& name) const;
+  /// Hands over what came since the last call, and keeps none of it: for a link, which has no end. Where the
+  /// same comes in several messages, those of HIGHRES_IMU count, else of SCALED_IMU (SCALED_PRESSURE), as
+  /// soon as there is one.
+  [[nodiscard]] NewSamples take();
+  [[nodiscard]] std::size_t unitless() const { return unitless_; }        ///< RAW_IMU that nobody can read
+  [[nodiscard]] std::size_t without_fix() const { return without_fix_; }  ///< fixes in fewer dimensions
 
  private:
   enum Source : std::uint8_t { highres, scaled, raw };
@@ -71,10 +88,22 @@ class SensorGatherer {
 
   Autopilot autopilot_;
   BootClock clock_;
-  std::array<std::vector<ImuSample>, 3> imu_;  // by source
-  std::array<std::vector<MagneticField>, 3> fields_;
-  std::array<std::vector<BarometricHeight>, 2> heights_;  // HIGHRES_IMU, SCALED_PRESSURE
-  std::vector<io::GeodeticFix> fixes_;
+  /// Samples of one kind from one message.
+  template <class Sample>
+  struct Channel {
+    std::vector<Sample> samples;
+    std::optional<Time> last;  // also of what has been taken
+    /// False: the same once more.
+    bool is_new(Time time) {
+      if (last == time) return false;
+      last = time;
+      return true;
+    }
+  };
+  std::array<Channel<ImuSample>, 3> imu_;  // by source
+  std::array<Channel<MagneticField>, 3> fields_;
+  std::array<Channel<BarometricHeight>, 2> heights_;  // HIGHRES_IMU, SCALED_PRESSURE
+  Channel<io::GeodeticFix> fixes_;
   std::size_t unitless_ = 0;  // RAW_IMU of somebody whose units nobody knows
   std::size_t without_fix_ = 0;
 };

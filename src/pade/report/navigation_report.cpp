@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "pade/report/plot/simple_plot.hpp"
-#include "pade/report/report_style.hpp"
+#include "pade/report/report_text.hpp"
 
 namespace pade {
 namespace {
@@ -170,12 +170,7 @@ std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
 std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run,
                               const std::optional<evaluation::MotionSummary>& score,
                               const std::string& figures) {
-  std::string html = fmt::format(
-      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}"
-      "svg.plot {{ width: 100%; max-width: 860px; display: block; background: #fff; "
-      "}}</style></head><body><main>\n<h1>{}</h1>\n",
-      title, evaluation::report_style, title);
-  for (const std::string& remark : log.remarks) html += "<p>" + remark + "</p>\n";
+  std::string html = evaluation::begin_page(title, evaluation::plot_page_style, log.remarks);
   if (score) {
     html += fmt::format(
         "<table><tr><th>against truth, neighbouring frames</th><th></th></tr>\n"

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "pade/report/report_style.hpp"
+
 namespace pade::evaluation {
 
 std::string escape_html(std::string_view text) {
@@ -21,6 +23,16 @@ std::string escape_html(std::string_view text) {
       safe += c;
   }
   return safe;
+}
+
+std::string begin_page(std::string_view title, std::string_view style, std::span<const std::string> remarks) {
+  const std::string safe = escape_html(title);
+  std::string html = fmt::format(
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}{}"
+      "</style></head><body><main>\n<h1>{}</h1>\n",
+      safe, report_style, style, safe);
+  for (const std::string& remark : remarks) html += fmt::format("<p>{}</p>\n", escape_html(remark));
+  return html;
 }
 
 std::string percent_text(double share) {

@@ -1,4 +1,6 @@
 // Faults of the sensors in flight: the navigator says that it is lost, and finds back.
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -193,6 +195,45 @@ TEST(Faults, BeingLostDoesNotDependOnWhenTheDataCame) {
     lost = lost || answers[0][i].status == NavigationStatus::lost;
   }
   EXPECT_TRUE(lost);
+}
+
+/// A receiver of course and speed over ground alone, on a vehicle that climbs at 2 m/s between other flight:
+/// its velocities are no contradiction of its positions.
+TEST(IntegrityInFlight, AClimbThatTheVelocitiesDoNotMeasureIsNoFault) {
+  constexpr double kFrom = 20, kFor = 12, kSpeed = 2;  // s, s, m/s
+  const auto climb = [](double t) {   // height, its rate and its acceleration; fading in and out over 1 s
+    const auto ramp = [](double s) {  // a smooth step, its integral from 0 on, and its derivative
+      const double u = std::clamp(s, 0.0, 1.0);
+      const double past = std::max(0.0, s - 1);
+      return std::array{3 * u * u - 2 * u * u * u, u * u * u - 0.5 * u * u * u * u + past, 6 * u - 6 * u * u};
+    };
+    const auto up = ramp(t - kFrom), down = ramp(t - kFrom - kFor);
+    return Vector3d(kSpeed * (up[1] - down[1]), kSpeed * (up[0] - down[0]), kSpeed * (up[2] - down[2]));
+  };
+  NavigationLog log;
+  simulation::Imu imu(simulation::ImuModel::industrial(), 3);
+  simulation::Gnss gnss(simulation::GnssModel::single_point(), 4);
+  for (int i = 0; i < 200 * 50; ++i) {
+    auto state = Flight{}.at(i / 200.0);
+    const Vector3d rise = climb(i / 200.0);
+    state.position.z() += rise[0];
+    state.velocity.z() += rise[1];
+    state.acceleration.z() += rise[2];
+    log.imu.push_back(imu.sample(state));
+    log.truth.push_back({state.time, {state.R_world_body, state.position}, state.velocity});
+    if (i % 10 == 0) log.barometer.push_back({state.time, state.position.z(), 0.3});
+    if (i % 40 != 0) continue;
+    auto epoch = gnss.sample(state);
+    epoch.velocity.velocity.z() = 0;
+    epoch.velocity.covariance(2, 2) = 100;
+    log.gnss.fixes.push_back(epoch.fix);
+    log.gnss.velocities.push_back(epoch.velocity);
+  }
+  const Outcome outcome = fly([](NavigationLog&) {}, 0, log);
+  EXPECT_EQ(outcome.health.velocity_doubted, 0U);
+  EXPECT_EQ(outcome.health.times_lost, 0U);
+  EXPECT_EQ(outcome.health.restarts, 0U);
+  EXPECT_GT(outcome.noticed, 1e8) << "navigating all the time";
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ double told(double speed, double noise, std::uint64_t seed) {
     const double t = 0.2 * i;
     const Vector3d v(3 * std::sin(0.3 * t), 3 * std::cos(0.3 * t), 0);
     const Vector3d p(-10 * std::cos(0.3 * t), 10 * std::sin(0.3 * t), 0);
-    agreement.velocity(v + 0.05 * random.normal3(), at(t));
+    agreement.velocity(v + 0.05 * random.normal3(), Vector3d::Ones(), at(t));
     const Vector3d ramp(0, std::max(0.0, t - 30) * speed, 0);
     agreement.position(p + ramp + noise * random.normal3(), Vector3d::Constant(noise),
                        Vector3d::Constant(noise / 2), at(t));
@@ -117,11 +117,39 @@ TEST(GnssAgreement, TellsPositionsThatLeaveTheVelocities) {
   }
 }
 
+/// A receiver that reports course and speed over ground: the climb is no contradiction, what lies along it
+/// is.
+TEST(GnssAgreement, OfWhatIsNotMeasuredNothingIsSaid) {
+  for (const double aside : {0.0, 1.0}) {
+    Random random(9);
+    GnssAgreement agreement;
+    bool contradicts = false;
+    for (int i = 0; i < 5 * 90; ++i) {
+      const double t = 0.2 * i;
+      agreement.velocity(Vector3d(2, 0, 0), Vector3d(1, 1, 0), at(t));
+      const Vector3d place(2 * t, aside * std::max(0.0, t - 30), 30 * std::sin(0.2 * t));
+      agreement.position(place + 0.25 * random.normal3(), Vector3d::Constant(0.25), Vector3d::Constant(0.13),
+                         at(t));
+      contradicts = contradicts || agreement.contradicts();
+    }
+    EXPECT_EQ(contradicts, aside > 0);
+  }
+  // The climb is measured from some moment on: what was before is no evidence.
+  GnssAgreement agreement;
+  for (int i = 0; i < 5 * 90; ++i) {
+    const double t = 0.2 * i;
+    const bool measures = t > 40;
+    agreement.velocity(Vector3d(0, 0, measures ? 1 : 0), Vector3d(1, 1, measures ? 1 : 0), at(t));
+    agreement.position(Vector3d(0, 0, t), Vector3d::Constant(0.25), Vector3d::Constant(0.13), at(t));
+    ASSERT_FALSE(agreement.contradicts()) << t;
+  }
+}
+
 TEST(GnssAgreement, OutliersAreNoDrift) {
   Random random(6);
   GnssAgreement agreement;
   for (int i = 0; i < 5 * 600; ++i) {
-    agreement.velocity(0.05 * random.normal3(), at(0.2 * i));
+    agreement.velocity(0.05 * random.normal3(), Vector3d::Ones(), at(0.2 * i));
     const double noise = random.uniform() < 0.1 ? 20 : 0.25;
     agreement.position(noise * random.normal3(), Vector3d::Constant(0.25), Vector3d::Constant(0.13),
                        at(0.2 * i));
@@ -136,7 +164,7 @@ TEST(GnssAgreement, AJumpIsNoDriftButJumpsInOneDirectionAre) {
     double offset = 0;
     for (int i = 0; i < 5 * 60; ++i) {
       const double t = 0.2 * i;
-      agreement.velocity(Vector3d::Zero(), at(t));
+      agreement.velocity(Vector3d::Zero(), Vector3d::Ones(), at(t));
       if (i >= 100 && i % 10 == 0) {  // every two seconds
         const double step = back && i % 20 == 0 ? -5 : 5;
         offset += step;

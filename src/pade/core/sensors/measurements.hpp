@@ -30,6 +30,15 @@ struct GnssVelocity {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< (m/s)²
 };
 
+/// A component of a GNSS velocity with this sigma or a larger one is not measured, m/s.
+inline constexpr double unmeasured_velocity = 5;
+/// 1 for the components that are measured (east, north, up), 0 for the others: many receivers report course
+/// and speed over ground alone.
+inline Eigen::Vector3d measured_axes(const GnssVelocity& velocity) {
+  constexpr double kVariance = unmeasured_velocity * unmeasured_velocity;
+  return (velocity.covariance.diagonal().array() < kVariance).cast<double>();
+}
+
 /// A barometric height above an unknown, slowly drifting zero.
 struct BarometricHeight {
   Time time;          ///< of the measurement

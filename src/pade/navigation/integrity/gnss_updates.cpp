@@ -162,8 +162,11 @@ Innovation Filter::update(const GnssVelocity& velocity) {
       innovation = believe_velocity(prediction, residual, noise);
     }
   }
-  integrity.agreement.velocity(velocity.velocity, now);
-  integrity.dispute.velocity(velocity.velocity, prediction.value, now, !used(innovation));
+  const Vector3d axes = measured_axes(velocity);
+  // Of what is not measured there is no dispute.
+  const Vector3d heard = (axes.array() > 0).select(velocity.velocity, prediction.value);
+  integrity.agreement.velocity(velocity.velocity, axes, now);
+  integrity.dispute.velocity(heard, prediction.value, now, !used(innovation));
   if (used(innovation)) {
     core_.velocity_accepted = now;
     core_.velocity_seen = true;

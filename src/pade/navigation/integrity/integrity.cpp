@@ -70,7 +70,12 @@ Dispute::Ruling Dispute::position(const Vector3d& measured, double white_sigma, 
 
 bool Dispute::can_rule(Time now) const { return has_fix_ && seconds_between(fix_time_, now) < kFixAge; }
 
-void GnssAgreement::velocity(const Vector3d& measured, Time now) {
+void GnssAgreement::velocity(const Vector3d& measured, const Vector3d& axes, Time now) {
+  if (axes != axes_) {  // the ways so far are of other axes
+    axes_ = axes;
+    positions_ = 0;
+    ratio_ = 0;
+  }
   const double dt = seconds_between(time_, now);
   if (has_velocity_) way_ += 0.5 * dt * (velocity_ + measured);
   fastest_ = std::max(measured.norm(), has_velocity_ ? fastest_ * std::exp(-dt / kSpeedMemory) : 0);
@@ -82,7 +87,7 @@ void GnssAgreement::velocity(const Vector3d& measured, Time now) {
 void GnssAgreement::position(const Vector3d& measured, const Vector3d& white, const Vector3d& walk,
                              Time now) {
   if (!has_velocity_) return;
-  const Vector3d apart = measured - way_ - seconds_between(time_, now) * velocity_;
+  const Vector3d apart = axes_.cwiseProduct(measured - way_ - seconds_between(time_, now) * velocity_);
   const double dt = positions_ > 0 ? seconds_between(position_time_, now) : 0;
   position_time_ = now;
   if (positions_++ == 0) {

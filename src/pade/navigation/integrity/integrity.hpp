@@ -37,7 +37,8 @@ class Dispute {
 /// Whether the positions of the GNSS move as its velocities say, whatever the filter holds of either.
 class GnssAgreement {
  public:
-  void velocity(const Vector3d& measured, Time now);
+  /// @param axes  1 for those that are measured, 0 for the others, of which nothing is said
+  void velocity(const Vector3d& measured, const Vector3d& axes, Time now);
   /// @param white    standard deviation of the white noise per axis, m
   /// @param walk     by which the correlated error changes in a second, per axis, m
   void position(const Vector3d& measured, const Vector3d& white, const Vector3d& walk, Time now);
@@ -56,6 +57,7 @@ class GnssAgreement {
   int positions_ = 0;
   Time time_;
   Vector3d velocity_ = Vector3d::Zero();
+  Vector3d axes_ = Vector3d::Ones();  ///< that are measured
   Vector3d way_ = Vector3d::Zero();   ///< integral of the velocities, m
   Vector3d fast_ = Vector3d::Zero();  ///< position less way, averaged over a short and a long time, m
   Vector3d slow_ = Vector3d::Zero();

@@ -118,6 +118,19 @@ void check_upright(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) 
       "+9.8 upwards)");
 }
 
+/// Without the axes in which some velocity is not measured: neither velocities nor positions have any way
+/// there.
+GnssLog measured_part(const GnssLog& gnss) {
+  Vector3d axes = Vector3d::Ones();
+  for (const GnssVelocity& velocity : gnss.velocities) axes = axes.cwiseProduct(measured_axes(velocity));
+  GnssLog part = gnss;
+  if (axes == Vector3d::Ones()) return part;
+  for (GnssFix& fix : part.fixes) fix.position = fix.position.cwiseProduct(axes).eval();
+  for (GnssVelocity& velocity : part.velocities)
+    velocity.velocity = velocity.velocity.cwiseProduct(axes).eval();
+  return part;
+}
+
 /// The mean velocity between two fixes, from the velocities in between.
 void check_positions(const GnssLog& gnss, std::vector<Hint>& hints) {
   constexpr double kStep = 2;  // s
@@ -350,7 +363,8 @@ std::vector<Hint> check_log(const NavigationLog& log) {
   check_stamps_go_back(log.imu, hints);
   check_rate(log.imu, hints);
   check_upright(log.imu, hints);
-  check_positions(log.gnss, hints);
+  const GnssLog gnss = measured_part(log.gnss);
+  check_positions(gnss, hints);
   const bool clocks = std::any_of(hints.begin(), hints.end(), [](const Hint& hint) {
     return hint.severity == HintSeverity::error && (hint.id == "no-overlap" || hint.id == "stamps-go-back");
   });
@@ -360,7 +374,7 @@ std::vector<Hint> check_log(const NavigationLog& log) {
   const bool contradicts = std::any_of(hints.begin(), hints.end(), [](const Hint& hint) {
     return hint.severity == HintSeverity::error && hint.id != "upside-down";
   });
-  if (!contradicts) check_drift(log.gnss, check_apart(log.gnss, given, velocity_lag, hints), hints);
+  if (!contradicts) check_drift(gnss, check_apart(gnss, given, velocity_lag, hints), hints);
   return hints;
 }
 

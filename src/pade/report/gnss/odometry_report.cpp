@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "pade/report/plot/simple_plot.hpp"
-#include "pade/report/report_style.hpp"
 #include "pade/report/report_text.hpp"
 
 namespace pade {
@@ -172,12 +171,7 @@ std::optional<PlanarScore> score_planar(const gnss::RawLog& log, const PlanarRun
 
 std::string odometry_report(const std::string& title, const gnss::RawLog& log, const PlanarRun& run,
                             const gnss::RawRun& alone) {
-  std::string html = fmt::format(
-      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}"
-      "svg.plot {{ width: 100%; max-width: 860px; display: block; background: #fff; "
-      "}}</style></head><body><main>\n<h1>{}</h1>\n",
-      evaluation::escape_html(title), evaluation::report_style, evaluation::escape_html(title));
-  for (const std::string& remark : log.remarks) html += "<p>" + evaluation::escape_html(remark) + "</p>\n";
+  std::string html = evaluation::begin_page(title, evaluation::plot_page_style, log.remarks);
   html += fmt::format(
       "<table><tr><th></th><th></th></tr>\n<tr><td>epochs with a position / all; samples of odometry; gaps "
       "in "

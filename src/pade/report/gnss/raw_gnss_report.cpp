@@ -11,7 +11,6 @@
 
 #include "pade/navigation/tight/raw_epoch.hpp"
 #include "pade/report/plot/simple_plot.hpp"
-#include "pade/report/report_style.hpp"
 #include "pade/report/report_text.hpp"
 
 namespace pade {
@@ -386,12 +385,7 @@ std::string slip_plot(const NavigationRun& run) {
 
 std::string raw_report(const std::string& title, const gnss::RawLog& log, const gnss::RawRun& run,
                        const std::optional<RawScore>& score) {
-  std::string html = fmt::format(
-      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title><style>{}"
-      "svg.plot {{ width: 100%; max-width: 860px; display: block; background: #fff; "
-      "}}</style></head><body><main>\n<h1>{}</h1>\n",
-      evaluation::escape_html(title), evaluation::report_style, evaluation::escape_html(title));
-  for (const std::string& remark : log.remarks) html += "<p>" + evaluation::escape_html(remark) + "</p>\n";
+  std::string html = evaluation::begin_page(title, evaluation::plot_page_style, log.remarks);
   html += counts_table(run, score);
   if (const auto frame = local_frame(run)) html += path_plot(log, run, *frame);
   html += sky_plot(run);

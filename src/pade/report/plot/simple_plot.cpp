@@ -39,6 +39,20 @@ struct Range {
   }
 };
 
+/// Ticks of a horizontal axis at height `y`, with their numbers.
+template <class ToPixels>
+std::string ticks_below(const Range& x, const ToPixels& px, double y) {
+  std::string svg;
+  const double step = tick_step(x.high - x.low);
+  for (double v = std::ceil(x.low / step) * step; v <= x.high; v += step) {
+    fmt::format_to(std::back_inserter(svg),
+                   "<path d=\"M{:.1f} {:.1f}v4\" stroke=\"#8893a0\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
+                   "text-anchor=\"middle\">{:.6g}</text>\n",
+                   px(v), y, px(v), y + 17, std::abs(v) < 1e-9 * step ? 0 : v);
+  }
+  return svg;
+}
+
 /// A frame with a title around what is drawn.
 std::string figure(const std::string& title, double width, double height, const std::string& drawn) {
   return fmt::format(
@@ -82,14 +96,7 @@ std::string simple_plot(const std::string& title, const std::string& x_label, co
   fmt::format_to(out,
                  "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#8893a0\"/>\n",
                  kLeft, kTop, inner_width, inner_height);
-  const double dx = tick_step(x.high - x.low);
-  for (double v = std::ceil(x.low / dx) * dx; v <= x.high; v += dx) {
-    fmt::format_to(out,
-                   "<path d=\"M{:.1f} {:.1f}v4\" stroke=\"#8893a0\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
-                   "text-anchor=\"middle\">{:.6g}</text>\n",
-                   px(v), kTop + inner_height, px(v), kTop + inner_height + 17,
-                   std::abs(v) < 1e-9 * dx ? 0 : v);
-  }
+  svg += ticks_below(x, px, kTop + inner_height);
   const double dy = tick_step(y.high - y.low);
   for (double v = std::ceil(y.low / dy) * dy; v <= y.high; v += dy) {
     fmt::format_to(out,
@@ -153,14 +160,7 @@ std::string rows_plot(const std::string& title, const std::string& x_label,
                    "text-anchor=\"end\">{}</text>\n",
                    kLeft, y, inner_width, kLeft - 6, y + 4, names[i]);
   }
-  const double dx = tick_step(x.high - x.low);
-  for (double v = std::ceil(x.low / dx) * dx; v <= x.high; v += dx) {
-    fmt::format_to(out,
-                   "<path d=\"M{:.1f} {:.1f}v4\" stroke=\"#8893a0\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
-                   "text-anchor=\"middle\">{:.6g}</text>\n",
-                   px(v), kTop + inner_height, px(v), kTop + inner_height + 17,
-                   std::abs(v) < 1e-9 * dx ? 0 : v);
-  }
+  svg += ticks_below(x, px, kTop + inner_height);
   fmt::format_to(out, "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n",
                  kLeft + 0.5 * inner_width, height - 6, x_label);
   double legend = kLeft;
