@@ -67,6 +67,7 @@ cv::Mat obstacle_picture(const cv::Mat& image, const cv::Mat& depth, const cv::M
 cv::Mat depth_picture(const cv::Mat& depth, const cv::Mat& variance, cv::Size size) {
   static const std::array<cv::Vec3b, 256> kColours = colours_of_depth();
   constexpr float kNearest = 1, kFarthest = 20;  // m: ends of the colours, which go by 1 / Z
+  constexpr float kDarkest = 25;                 // what is below cannot be told from none
   cv::Mat picture(size, CV_8UC3, cv::Scalar(kNoDepth[0], kNoDepth[1], kNoDepth[2]));
   if (depth.empty()) return picture;
   const cv::Mat z = of_size(depth, size);
@@ -79,7 +80,8 @@ cv::Mat depth_picture(const cv::Mat& depth, const cv::Mat& variance, cv::Size si
       const float pale = doubt(depths[u], variances[u]);
       if (pale > 1) continue;
       const float near = (1 / depths[u] - 1 / kFarthest) / (1 / kNearest - 1 / kFarthest);
-      const cv::Vec3b& colour = kColours[static_cast<std::size_t>(255 * std::clamp(near, 0.0F, 1.0F))];
+      const cv::Vec3b& colour =
+          kColours[static_cast<std::size_t>(kDarkest + (255 - kDarkest) * std::clamp(near, 0.0F, 1.0F))];
       for (int c = 0; c < 3; ++c)
         row[u][c] =
             static_cast<std::uint8_t>(static_cast<float>(colour[c]) * (1 - 0.7F * pale) + 255 * 0.7F * pale);

@@ -120,17 +120,16 @@ io::Diagnosis SessionHealth::of(const HealthInputs& inputs) {
   put("web_refused", fmt::format("{}", inputs.web.refused));
   if (!inputs.web.last_refusal.empty()) put("web_last_refusal", inputs.web.last_refusal);
   if (!inputs.stamps.empty()) put("stamps", inputs.stamps);
+  std::string reasons;
   for (const auto& [reason, count] : counts.reasons)
-    put("skipped_because", fmt::format("{}: {}", reason, count));
+    reasons += fmt::format("{}{}: {}", reasons.empty() ? "" : "; ", reason, count);
+  if (!reasons.empty()) put("skipped_because", reasons);
   return diagnosis;
 }
 
 std::string json_of(const io::Diagnosis& diagnosis) {
   nlohmann::ordered_json values = nlohmann::ordered_json::object();
-  for (const auto& [key, value] : diagnosis.values) {
-    // Of one key there may be several lines.
-    values[key] = values.contains(key) ? fmt::format("{}; {}", values[key].get<std::string>(), value) : value;
-  }
+  for (const auto& [key, value] : diagnosis.values) values[key] = value;
   const nlohmann::ordered_json json = {
       {"level", diagnosis.level}, {"message", diagnosis.message}, {"values", std::move(values)}};
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);

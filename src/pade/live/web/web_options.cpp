@@ -21,12 +21,14 @@ std::string_view name_of_host(std::string_view host) {
   return host.substr(0, host.rfind(':'));
 }
 
-bool is_loopback_name(std::string_view name) {
-  return name == "localhost" || name == "[::1]" || name.starts_with("127.");
+bool is_loopback_address(const std::string& address) {
+  constexpr unsigned char kNet = 127;
+  std::array<unsigned char, sizeof(in_addr)> binary{};
+  return address == "::1" || (::inet_pton(AF_INET, address.c_str(), binary.data()) == 1 && binary[0] == kNet);
 }
 
-bool is_loopback_address(const std::string& address) {
-  return address == "::1" || address.starts_with("127.");
+bool is_loopback_name(std::string_view name) {
+  return name == "localhost" || name == "[::1]" || is_loopback_address(std::string(name));
 }
 
 bool is_address(const std::string& address) {

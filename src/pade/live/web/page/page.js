@@ -123,7 +123,7 @@ function drawRing (scan) {
     const share = Number.isFinite(range) ? Math.sqrt(Math.min(range / scan.farthest, 1)) : 1
     const radius = outer * (0.22 + 0.7 * share)
     g.beginPath()
-    g.arc(middle, middle, Number.isFinite(range) ? outer : outer, bearing - half * 0.92, bearing + half * 0.92)
+    g.arc(middle, middle, outer, bearing - half * 0.92, bearing + half * 0.92)
     g.arc(middle, middle, Number.isFinite(range) ? radius : outer - 12, bearing + half * 0.92, bearing - half * 0.92, true)
     g.fill()
   })
@@ -160,16 +160,20 @@ class MapScene {
     this.line.frustumCulled = false
     this.scene.add(this.line)
     this.azimuth = null // of the eye from the target; null: behind the vehicle
-    this.height = 0.6
-    this.distance = 14
+    this.height = 0.7
+    this.distance = 16
     this.changed = true
     this.listen()
-    const turn = () => {
-      if (this.changed) this.draw()
-      this.changed = false
+    let drawn = 0
+    const turn = (now) => { // ten times a second, and as fast as it goes while somebody drags
+      if (this.changed && (this.dragged || now - drawn > 100)) {
+        this.draw()
+        drawn = now
+        this.changed = this.dragged = false
+      }
       window.requestAnimationFrame(turn)
     }
-    turn()
+    turn(0)
   }
 
   listen () {
@@ -179,7 +183,7 @@ class MapScene {
       if (this.azimuth === null) this.azimuth = this.heading() + Math.PI
       this.azimuth -= 0.008 * e.movementX
       this.height = Math.min(1.5, Math.max(-0.3, this.height + 0.006 * e.movementY))
-      this.changed = true
+      this.changed = this.dragged = true
     })
     canvas.addEventListener('wheel', (e) => {
       this.distance = Math.min(300, Math.max(2, this.distance * Math.exp(0.001 * e.deltaY)))
