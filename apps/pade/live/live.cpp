@@ -179,7 +179,8 @@ class Web {
     std::error_code failed;
     if (!std::filesystem::exists(options.web.three, failed))
       say(fmt::format("page: no 3-D view, since there is no {} (Debian's libjs-three)\n", options.web.three));
-    say(fmt::format("page: {}; Foxglove: the same with ws://\n", web->server_->url()));
+    say(fmt::format("page: {}{}; Foxglove: the same with ws://\n", web->server_->url(),
+                    options.web.token.empty() ? "" : "?token=... (web.token)"));
     return web;
   }
   [[nodiscard]] live::Publisher& publisher() { return *publisher_; }
@@ -304,19 +305,21 @@ Status run_live(const LiveArguments& arguments) {
   (void)std::signal(SIGHUP, SIG_IGN);  // a terminal out of radio range must not end the flight's map
   auto parts = open_parts(arguments);
   if (!parts) return parts.error();
-  if (arguments.check) return check_parts(*parts);
   const live::LiveOptions& options = parts->options;
   live::Progress progress;
-  const auto sight = live::SectorView::of(parts->camera.source->camera(), parts->camera.T_body_camera);
-  live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth, sight);
-  std::vector<live::Sink*> sinks{&sectors};
-  std::optional<live::MapSaver> saver;
-  if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
   std::unique_ptr<Web> web;
   if (arguments.web) {
     auto opened = Web::open(*parts, progress);
     if (!opened) return opened.error();
     web = std::move(*opened);
+  }
+  if (arguments.check) return check_parts(*parts);
+  const auto sight = live::SectorView::of(parts->camera.source->camera(), parts->camera.T_body_camera);
+  live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth, sight);
+  std::vector<live::Sink*> sinks{&sectors};
+  std::optional<live::MapSaver> saver;
+  if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
+  if (web) {
     sinks.push_back(&web->publisher());
     sectors.listener = [raw = &web->publisher()](const auto& distances, Time frame) {
       raw->take_sectors(distances, frame);

@@ -1,5 +1,5 @@
 // Looks at the page in headless Chromium while build/tests/live/web_session runs, and compares what it shows with
-// health.json and with the messages themselves. scripts/page-check starts it: PROGRAM FLIGHT PICTURE.
+// health.json and with the messages themselves. scripts/web-oracle starts it: PROGRAM FLIGHT PICTURE.
 const { spawn } = require('child_process')
 const fs = require('fs')
 const http = require('http')

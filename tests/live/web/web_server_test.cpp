@@ -108,7 +108,7 @@ TEST_F(WebServerTest, AsksForItsToken) {
   EXPECT_THAT(answer({.path = "/health.json", .upgrade = false}), HasSubstr(" 401 "));
   EXPECT_THAT(answer({.path = "/?token=0123456789abcdef", .upgrade = false}),
               HasSubstr("<title>pade live</title>"));
-  EXPECT_THAT(server_->url(), HasSubstr("?token=0123456789abcdef"));
+  EXPECT_EQ(server_->url(), fmt::format("http://127.0.0.1:{}/", server_->port()));  // it goes into logs
 }
 
 TEST_F(WebServerTest, ServesThePageAndItsFiles) {

@@ -1,4 +1,4 @@
-// A session with the server, from a recorded flight: for scripts/page-check and for measuring what clients
+// A session with the server, from a recorded flight: for scripts/web-oracle and for measuring what clients
 // cost. Not a test of its own.
 #include <algorithm>
 #include <array>

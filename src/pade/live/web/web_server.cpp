@@ -471,8 +471,7 @@ int WebServer::port() const { return work_->port(); }
 std::string WebServer::url() const {
   const WebOptions& options = work_->options();
   const bool six = options.address.find(':') != std::string::npos;
-  return fmt::format("http://{}{}{}:{}/{}{}", six ? "[" : "", options.address, six ? "]" : "", port(),
-                     options.token.empty() ? "" : "?token=", options.token);
+  return fmt::format("http://{}{}{}:{}/", six ? "[" : "", options.address, six ? "]" : "", port());
 }
 
 WebCounts WebServer::counts() const { return work_->counts(); }

@@ -28,7 +28,7 @@ class WebServer {
 
   /// That it listens at.
   [[nodiscard]] int port() const;
-  /// "http://127.0.0.1:8765/", with the token if there is one.
+  /// "http://127.0.0.1:8765/"; a token is not told.
   [[nodiscard]] std::string url() const;
   [[nodiscard]] WebCounts counts() const;
 
