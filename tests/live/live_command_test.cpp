@@ -125,6 +125,16 @@ TEST_F(LiveCommand, CheckFindsWhatIsThereAndWhatIsNot) {
   EXPECT_FALSE(fs::exists(folder_ / "map.bt"));
 }
 
+TEST_F(LiveCommand, ShowsItselfOverTheNetworkWhereThatIsAskedFor) {
+  record(3);
+  const std::string file = config("web: {port: 24583}\nmap: \"\"\n").string();
+  const test::Outcome shown = test::shell(fmt::format("{} live --web {}", test::kPade, file));
+  if (shown.text.find("without libwebsockets") != std::string::npos) GTEST_SKIP() << shown.text;
+  EXPECT_THAT(shown.text,
+              AllOf(HasSubstr("page: http://127.0.0.1:24583/; Foxglove"), HasSubstr("web: 0 clients now")));
+  EXPECT_THAT(test::shell(fmt::format("{} live {}", test::kPade, file)).text, Not(HasSubstr("24583")));
+}
+
 TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
   record(3);
   const struct {
@@ -137,6 +147,8 @@ TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
       {"sectors: {own_radius: 10, max_distance: 5}\n", "sectors.own_radius is 10"},
       {"sectors: {max_distance: .nan}\n", "sectors.max_distance"},
       {"mapper_: {}\n", "mapper_"},
+      {"web: {address: 0.0.0.0}\n", "web.token: found none"},
+      {"web: {port: 99999}\n", "web.port"},
   };
   for (const auto& c : cases) {
     const test::Outcome refused =

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <span>
 #include <string>
@@ -18,6 +19,7 @@
 
 #include "pade/live/link/autopilot_link.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
+#include "pade/live/mavlink/sensor_messages.hpp"
 
 #include "live/wall_camera.hpp"
 
@@ -27,7 +29,10 @@ namespace pade::live {
 /// milliseconds, as those of autopilots are.
 class UdpAutopilot {
  public:
-  UdpAutopilot(Time zero, int port) : zero_(zero), port_(port), thread_([this] { run(); }) {}
+  /// Of the body, world ENU, at a time of our clock; in place of the flight to the east.
+  using Flight = std::function<Pose(Time)>;
+  UdpAutopilot(Time zero, int port, Flight flight = {})
+      : zero_(zero), port_(port), flight_(std::move(flight)), thread_([this] { run(); }) {}
   UdpAutopilot(const UdpAutopilot&) = delete;
   UdpAutopilot& operator=(const UdpAutopilot&) = delete;
   ~UdpAutopilot() {
@@ -73,9 +78,27 @@ class UdpAutopilot {
   void tell_pose() {
     const auto boot = static_cast<std::uint32_t>(clock() / 1'000'000);
     const Time ours{static_cast<std::int64_t>(boot) * 1'000'000 + 500'000'000'000};
+    if (flight_) return tell_flight(boot, ours);
     tell(mavlink::AttitudeQuaternion{boot, 1, 0, 0, 0, 0, 0, 0, {}});
     const auto east = static_cast<float>(kSpeed * seconds_between(zero_, ours));
     tell(mavlink::LocalPositionNed{boot, 0, east, 0, 0, static_cast<float>(kSpeed), 0});
+  }
+  void tell_flight(std::uint32_t boot, Time ours) {
+    constexpr std::int64_t kStep = 10'000'000;                                                  // ns
+    const Eigen::Matrix3d axes = (Eigen::Matrix3d() << 0, 1, 0, 1, 0, 0, 0, 0, -1).finished();  // ENU to NED
+    const Eigen::Matrix3d body = Eigen::Vector3d(1, -1, -1).asDiagonal();                       // FRD to FLU
+    const Pose pose = flight_(ours);
+    const Eigen::Quaternionf q(
+        Eigen::Quaterniond(Eigen::Matrix3d(axes * pose.rotation.toRotationMatrix() * body)).cast<float>());
+    const Eigen::Vector3f at = (axes * pose.translation).cast<float>();
+    const Eigen::Vector3f speed =
+        (axes *
+         (flight_({ours.nanoseconds + kStep}).translation - flight_({ours.nanoseconds - kStep}).translation) /
+         (2e-9 * static_cast<double>(kStep)))
+            .cast<float>();
+    tell(mavlink::AttitudeQuaternion{boot, q.w(), q.x(), q.y(), q.z(), 0, 0, 0, {}});
+    tell(mavlink::LocalPositionNed{boot, at.x(), at.y(), at.z(), speed.x(), speed.y(), speed.z()});
+    tell(mavlink::GpsRawInt{.fix_type = 3, .satellites_visible = 14});
   }
   void hear() {
     std::array<std::uint8_t, 1024> bytes;
@@ -95,6 +118,7 @@ class UdpAutopilot {
 
   Time zero_;
   int port_;
+  Flight flight_;
   int socket_ = ::socket(AF_INET, SOCK_DGRAM, 0);
   sockaddr_in to_{};
   mavlink::Sender sender_{3, 1, 0};

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -21,6 +22,8 @@
 #include "pade/live/recordings/session_recorder.hpp"
 #include "pade/live/service.hpp"
 #include "pade/live/session.hpp"
+#include "pade/live/web/publisher.hpp"
+#include "pade/live/web/web_server.hpp"
 
 #include "commands.hpp"
 
@@ -31,6 +34,7 @@ struct LiveArguments {
   std::string config;
   double seconds = 0;
   bool check = false;
+  bool web = false;
 };
 
 /// Talks with the autopilot in a thread of its own, as long as it lives.
@@ -146,11 +150,74 @@ Status check_parts(LiveParts& parts) {
 /// not the flight.
 void say(const std::string& text) { (void)std::fputs(text.c_str(), stderr); }
 
+/// The page and Foxglove, where they are asked for.
+class Web {
+ public:
+  static Result<std::unique_ptr<Web>> open(const LiveParts& parts, const live::Progress& progress) {
+    const live::LiveOptions& options = parts.options;
+    auto web = std::make_unique<Web>();
+    const auto question = [&link = *parts.link, &progress, poses = options.link.poses, raw = web.get()] {
+      live::HealthInputs inputs;
+      inputs.now = live::now_of_ours();
+      inputs.image = progress.image;
+      inputs.depth = progress.depth;
+      inputs.link = link.report();
+      inputs.missing = live::text_of(inputs.link, poses);
+      constexpr double kLongest = 0.4;  // s
+      const bool no_image = inputs.image == 0 || seconds_between({inputs.image}, inputs.now) > kLongest;
+      if (inputs.link.missing == live::Missing::autopilot && no_image)
+        inputs.missing = live::text_of(live::Missing::camera);
+      const std::lock_guard lock(raw->mutex_);
+      inputs.stamps = raw->stamps_;
+      return inputs;
+    };
+    web->publisher_.emplace(parts.camera.source->camera(), parts.camera.T_body_camera, options.sectors,
+                            question);
+    auto server = live::WebServer::start(options.web, *web->publisher_);
+    if (!server) return server.error();
+    web->server_ = std::move(*server);
+    std::error_code failed;
+    if (!std::filesystem::exists(options.web.three, failed))
+      say(fmt::format("page: no 3-D view, since there is no {} (Debian's libjs-three)\n", options.web.three));
+    say(fmt::format("page: {}{}; Foxglove: the same with ws://\n", web->server_->url(),
+                    options.web.token.empty() ? "" : "?token=... (web.token)"));
+    return web;
+  }
+  [[nodiscard]] live::Publisher& publisher() { return *publisher_; }
+  /// Now and then; the mapper's thread.
+  void maybe(const live::SessionCounts& counts, const std::string& stamps) {
+    constexpr double kPause = 0.2;  // s
+    const Time now = live::now_of_ours();
+    if (seconds_between(last_, now) < kPause) return;
+    last_ = now;
+    publisher_->take_counts(counts);
+    const std::lock_guard lock(mutex_);
+    stamps_ = stamps;
+  }
+  /// For the log.
+  [[nodiscard]] std::string text() const {
+    const live::WebCounts counts = server_->counts();
+    std::string text =
+        fmt::format("web: {} clients now, {} so far; {} messages dropped for newer ones, {} requests refused",
+                    counts.clients, counts.come, counts.dropped, counts.refused);
+    if (!counts.last_refusal.empty()) text += fmt::format(" (last: {})", counts.last_refusal);
+    return text;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::string stamps_;
+  Time last_;
+  std::optional<live::Publisher> publisher_;
+  std::unique_ptr<live::WebServer> server_;  // last: it uses the others
+};
+
 /// A line each five seconds, for the log.
 class LiveLog {
  public:
   explicit LiveLog(live::PoseMessages poses) : poses_(poses) {}
-  void maybe(const live::Progress& progress, const live::LinkReport& link, const std::string& stamps) {
+  void maybe(const live::Progress& progress, const live::LinkReport& link, const std::string& stamps,
+             const Web* web) {
     constexpr double kPause = 5;  // s
     const Time now = live::now_of_ours();
     if (seconds_between(last_, now) < kPause) return;
@@ -163,6 +230,7 @@ class LiveLog {
                     live::text_of(link, poses_), age(progress.image), age(progress.depth), link.sectors_sent,
                     link.in.packets, link.in.bad, link.in.gaps));
     if (!stamps.empty()) say(stamps + "\n");
+    if (web != nullptr) say(web->text() + "\n");
   }
 
  private:
@@ -237,14 +305,26 @@ Status run_live(const LiveArguments& arguments) {
   (void)std::signal(SIGHUP, SIG_IGN);  // a terminal out of radio range must not end the flight's map
   auto parts = open_parts(arguments);
   if (!parts) return parts.error();
-  if (arguments.check) return check_parts(*parts);
   const live::LiveOptions& options = parts->options;
   live::Progress progress;
+  std::unique_ptr<Web> web;
+  if (arguments.web) {
+    auto opened = Web::open(*parts, progress);
+    if (!opened) return opened.error();
+    web = std::move(*opened);
+  }
+  if (arguments.check) return check_parts(*parts);
   const auto sight = live::SectorView::of(parts->camera.source->camera(), parts->camera.T_body_camera);
   live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth, sight);
   std::vector<live::Sink*> sinks{&sectors};
   std::optional<live::MapSaver> saver;
   if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
+  if (web) {
+    sinks.push_back(&web->publisher());
+    sectors.listener = [raw = &web->publisher()](const auto& distances, Time frame) {
+      raw->take_sectors(distances, frame);
+    };
+  }
   std::unique_ptr<live::SessionRecorder> recorder;
   if (!options.record.empty()) {
     const live::FrameSource& camera = *parts->camera.source;
@@ -264,7 +344,9 @@ Status run_live(const LiveArguments& arguments) {
     service.ready();
     const Time start = live::now_of_ours();
     session->run([&] {
-      log.maybe(progress, parts->link->report(), live::stamp_text(session->stamp_offset()));
+      const std::string stamps = live::stamp_text(session->stamp_offset());
+      log.maybe(progress, parts->link->report(), stamps, web.get());
+      if (web) web->maybe(session->counts(), stamps);
       pulse.maybe(*parts->link);
       const bool over =
           arguments.seconds > 0 && seconds_between(start, live::now_of_ours()) > arguments.seconds;
@@ -279,6 +361,7 @@ Status run_live(const LiveArguments& arguments) {
   std::string text = summary(session->counts(), parts->link->report());
   if (const std::string stamps = live::stamp_text(session->stamp_offset()); !stamps.empty())
     text += stamps + "\n";
+  if (web) text += web->text() + "\n";
   if (recorder != nullptr) text += recorded(*recorder);
   (void)std::fputs(text.c_str(), stdout);
   return saved;
@@ -297,9 +380,11 @@ void add_live(CLI::App& app, Context& context) {
       "and the file.\n"
       "What does not exist yet: poses from our own filter, OBSTACLE_DISTANCE_3D, "
       "signing, RTSP "
-      "and video\nfiles, ROS, DDS, Foxglove, a page.");
-  command->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map")
+      "and video\nfiles, ROS, DDS.");
+  command->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map, web")
       ->required();
+  command->add_flag("--web", arguments->web,
+                    "Show the session on a page and to Foxglove (section web of CONFIG)");
   command->add_flag("--check", arguments->check, "Open everything, say what is missing, and end");
   command->add_option("--for", arguments->seconds, "End after so many seconds")->check(CLI::Range(0.0, 1e6));
   command->callback([arguments, &context] {

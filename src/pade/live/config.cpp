@@ -34,6 +34,7 @@ Status check(const LiveOptions& options) {
   if (const Status status = check_ranges(ranges); !status) return status;
   if (const Status status = check(options.session); !status) return status;
   if (const Status status = check(options.sectors); !status) return status;
+  if (const Status status = check(options.web); !status) return status;
   const bool known = options.map.empty() || options.map.ends_with(".bt") || options.map.ends_with(".ot");
   if (!known)
     return Error{fmt::format("map: found \"{}\", expected a name that ends in .bt or .ot", options.map)};

@@ -14,6 +14,7 @@
 #include "pade/live/link/autopilot_link.hpp"
 #include "pade/live/sectors.hpp"
 #include "pade/live/session.hpp"
+#include "pade/live/web/web_options.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 
 namespace pade::live {
@@ -50,6 +51,7 @@ struct LiveOptions {
   std::string map = "map.bt";  ///< where the map is saved; empty: nowhere
   double autosave = 10;        ///< s between one save and the next; 0: only at the end
   std::string record;          ///< MCAP file of what is mapped; empty: none
+  WebOptions web;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -61,6 +63,7 @@ struct LiveOptions {
     field("map", self.map, "file (.bt, .ot) that the map is saved to; empty: nowhere");
     field("autosave", self.autosave, "between one save and the next, s; 0 = only at the end");
     field("record", self.record, "file (.mcap, .bag) that what is mapped is recorded in; empty: none");
+    field("web", self.web, "the page and Foxglove, with --web");
   }
 };
 /// Refuses numbers that make no sense (core/option_check.hpp).

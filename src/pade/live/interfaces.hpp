@@ -13,6 +13,7 @@
 #include "pade/core/time.hpp"
 #include "pade/live/link/autopilot_poses.hpp"
 #include "pade/mapping/query/map_view.hpp"
+#include "pade/pipeline/obstacle_mapper.hpp"
 
 namespace pade::live {
 
@@ -64,6 +65,9 @@ struct LiveUpdate {
   Pose T_world_body;                             ///< in the map's world
   std::shared_ptr<const mapping::MapView> view;  ///< constant; may be kept
   double depth_share = 0;                        ///< of the pixels that have a depth
+  cv::Mat image{};                               ///< as LiveFrame::image; may be kept
+  /// What the mapper did; valid until the sink returns, so clone what is to be kept. Not null in a session.
+  const MapperUpdate* mapped = nullptr;
 };
 
 /// A frame as it goes into the mapper.
@@ -96,6 +100,8 @@ class Sink {
   virtual ~Sink() = default;
 
   virtual void take(const LiveUpdate& update) = 0;
+  /// A frame that the map has nothing of: without a pose or a partner, or unusable.
+  virtual void pass(const LiveFrame& /*frame*/) {}
   /// The poses have jumped: what comes from now on is in another world, and the map is empty.
   virtual void begin_anew() {}
 };

@@ -46,8 +46,14 @@ class NewestFrame {
     const std::lock_guard lock(mutex_);
     return ended_ && !frame_;
   }
-  [[nodiscard]] std::size_t frames() const { return frames_; }
-  [[nodiscard]] std::size_t dropped() const { return dropped_; }
+  [[nodiscard]] std::size_t frames() const {
+    const std::lock_guard lock(mutex_);
+    return frames_;
+  }
+  [[nodiscard]] std::size_t dropped() const {
+    const std::lock_guard lock(mutex_);
+    return dropped_;
+  }
 
  private:
   mutable std::mutex mutex_;
@@ -124,6 +130,7 @@ void SectorSink::take(const LiveUpdate& update) {
   std::optional<mavlink::ObstacleDistance> message;
   if (says_anything) message = obstacle_distance_message(distances, update.time, options_);
   link_.offer(message, update.time);
+  if (listener) listener(distances, update.time);
 }
 
 std::string stamp_text(const std::optional<StampOffset>& offset) {
@@ -156,22 +163,28 @@ void Session::run(const std::function<bool()>& stop) {
     newest.end();
   });
   std::vector<LiveFrame> waiting;
-  std::size_t thinned = 0;
+  std::size_t dropped_before = 0;
+  const auto count = [&] {
+    counts_.frames = newest.frames();
+    const std::size_t dropped = newest.dropped();
+    counts_.dropped += dropped - dropped_before;
+    dropped_before = dropped;
+  };
   while (!stop() && !(newest.ended() && waiting.empty())) {
     parts_.progress.mapper = now_of_ours().nanoseconds;
     if (auto frame = newest.take(std::chrono::milliseconds(waiting.empty() ? 20 : 2))) {
       if (waiting.size() == kMostWaiting) {
         thin_out(waiting, frame->time);
-        ++thinned;
+        ++counts_.dropped;
       }
       waiting.push_back(std::move(*frame));
     }
     map_next(waiting, now_of_ours());
+    count();
   }
   camera.end();
   for (std::size_t i = 0; i < waiting.size(); ++i) skip("the session ended");
-  counts_.frames = newest.frames();
-  counts_.dropped += newest.dropped() + thinned;
+  count();
   counts_.dropped += newest.take(std::chrono::milliseconds(0)) ? 1U : 0U;
 }
 
@@ -216,9 +229,14 @@ bool Session::map_next(std::vector<LiveFrame>& waiting, Time now) {
     busy_ = busy_ > 0 ? 0.7 * busy_ + 0.3 * took : took;
   } else {
     skip(answer.kind == PoseAnswer::Kind::never ? std::string(answer.why) : "no pose in time");
+    pass(frame);
   }
   waiting.erase(waiting.begin());
   return true;
+}
+
+void Session::pass(const LiveFrame& frame) {
+  for (Sink* const sink : parts_.sinks) sink->pass(frame);
 }
 
 /// Poses before and after do not belong together.
@@ -246,17 +264,22 @@ void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
     if (view_ && !update.change.touched.empty())
       view_ = view_->after(mapper_.map(), update.change);                      // what it forgot
     skip(update.reason.substr(0, update.reason.find_first_of("0123456789")));  // one count for each kind
+    pass(frame);
     return;
   }
   last_ = frame.time;
   ++counts_.mapped;
   ++counts_.mapped_anew;
-  if (update.outcome != MapperUpdate::Outcome::mapped) return;
+  if (update.outcome != MapperUpdate::Outcome::mapped) {
+    pass(frame);
+    return;
+  }
   view_ = view_ ? view_->after(mapper_.map(), update.change) : mapping::MapView::of(mapper_.map());
   const double share = share_with_depth(update.depth);
   if (share >= options_.least_depth) parts_.progress.depth = frame.time.nanoseconds;
-  const LiveUpdate result{frame.time, camera_pose(mapper_.T_world_camera(), parts_.T_body_camera.inverse()),
-                          view_, share};
+  const LiveUpdate result{frame.time,  camera_pose(mapper_.T_world_camera(), parts_.T_body_camera.inverse()),
+                          view_,       share,
+                          frame.image, &update};
   for (Sink* const sink : parts_.sinks) sink->take(result);
 }
 

@@ -1,7 +1,9 @@
 // A live session: frames and poses in, map and sectors out, in threads that never wait for each other.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -62,6 +64,9 @@ class SectorSink : public Sink {
              const SectorView& view = {})
       : link_(link), options_(options), least_depth_(least_depth), view_(view) {}
   void take(const LiveUpdate& update) override;
+  /// Told of all distances before they are turned to the newest heading; the mapper's thread. To be set
+  /// before the session runs.
+  std::function<void(const std::array<std::uint16_t, kBins>& distances, Time frame)> listener;
 
  private:
   AutopilotLink& link_;
@@ -96,6 +101,7 @@ class Session {
   void run(const std::function<bool()>& stop);
 
   [[nodiscard]] const mapping::OccupancyMap& map() const { return mapper_.map(); }
+  /// While the session runs, for its own thread: as of when `stop` is asked.
   [[nodiscard]] const SessionCounts& counts() const { return counts_; }
   /// What the images say of their stamps against those of the poses.
   [[nodiscard]] const std::optional<StampOffset>& stamp_offset() const {
@@ -111,6 +117,7 @@ class Session {
   [[nodiscard]] PoseAnswer pose_of(const LiveFrame& frame) const;
   void map_frame(const LiveFrame& frame, const Pose& T_world_body);
   void skip(const std::string& reason);
+  void pass(const LiveFrame& frame);
   void begin_anew();
 
   SessionParts parts_;

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "pade/live/mavlink/estimate_messages.hpp"
+#include "pade/live/mavlink/sensor_messages.hpp"
 
 namespace pade::live {
 namespace {
@@ -94,6 +95,8 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     if (ours && ack->result != 0 && ack->result != kInProgress)
       report_.refused = fmt::format("command {} (result {})", ack->command, ack->result);
   }
+  if (const auto gnss = mavlink::unpack<mavlink::GpsRawInt>(frame))
+    report_.gnss = GnssState{gnss->fix_type, gnss->satellites_visible};
   poses_.add(frame);
 }
 

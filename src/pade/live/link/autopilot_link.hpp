@@ -40,6 +40,12 @@ struct LinkOptions {
   }
 };
 
+/// What the autopilot says of its GNSS receiver.
+struct GnssState {
+  std::uint8_t fix = 0;         ///< GPS_FIX_TYPE: 3 and more in three dimensions
+  std::uint8_t satellites = 0;  ///< 255: it does not say
+};
+
 /// What a link has done so far.
 struct LinkReport {
   mavlink::LinkCounts in;
@@ -49,13 +55,14 @@ struct LinkReport {
   std::size_t clock_restarts = 0;
   std::size_t attitudes = 0;
   std::size_t positions = 0;
-  std::size_t jumps = 0;    ///< of its estimate
-  bool poses_come = false;  ///< attitudes and positions, so that there are poses between them
+  std::size_t jumps = 0;          ///< of its estimate
+  std::optional<GnssState> gnss;  ///< empty: GPS_RAW_INT has not come
+  bool poses_come = false;        ///< attitudes and positions, so that there are poses between them
   std::size_t sectors_sent = 0;
   std::size_t sectors_stale = 0;  ///< too old when their turn came, so not sent
   std::size_t unsent = 0;         ///< packets that the port did not take
   std::string refused;            ///< the last request that the autopilot refused; empty if none
-  Missing missing = Missing::camera;
+  Missing missing = Missing::autopilot;
 };
 
 /// For the pilot: what is missing, and of poses which message; at most the 44 characters that a STATUSTEXT

@@ -6,6 +6,8 @@ std::string_view text_of(Missing missing) {
   switch (missing) {
     case Missing::nothing:
       return "obstacle mapping active";
+    case Missing::autopilot:
+      return "no HEARTBEAT from an autopilot";
     case Missing::camera:
       return "no image from the camera";
     case Missing::clock:

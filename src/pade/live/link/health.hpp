@@ -19,6 +19,7 @@ struct Progress {
 /// The first input that is missing.
 enum class Missing : std::uint8_t {
   nothing,
+  autopilot,  ///< no heartbeat has come yet, so nothing can be sent either
   camera,
   clock,
   pose,

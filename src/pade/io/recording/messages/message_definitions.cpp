@@ -23,7 +23,7 @@ constexpr std::string_view kRos1Header = "uint32 seq\ntime stamp\nstring frame_i
 constexpr std::string_view kRos2Header = "builtin_interfaces/Time stamp\nstring frame_id\n";
 constexpr std::string_view kCameraInfo = "sensor_msgs/CameraInfo";
 
-constexpr std::array<Definition, 21> kDefinitions = {{
+constexpr std::array<Definition, 35> kDefinitions = {{
     {"sensor_msgs/Image",
      "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 "
      "step\nuint8[] "
@@ -89,6 +89,50 @@ constexpr std::array<Definition, 21> kDefinitions = {{
     {"geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n", "", ""},
     {"geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n", "", ""},
     {"geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n", "", ""},
+    // Of what is shown (display_messages.hpp): only as ROS 2 (Humble) has them.
+    {"sensor_msgs/PointCloud2",
+     "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool "
+     "is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n",
+     "std_msgs/Header sensor_msgs/PointField", ""},
+    {"sensor_msgs/PointField",
+     "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\nuint8 UINT32=6\nuint8 "
+     "FLOAT32=7\nuint8 FLOAT64=8\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n",
+     "", ""},
+    {"sensor_msgs/LaserScan",
+     "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\nfloat32 "
+     "time_increment\nfloat32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] "
+     "intensities\n",
+     "std_msgs/Header", ""},
+    {"nav_msgs/Path", "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n",
+     "std_msgs/Header geometry_msgs/PoseStamped geometry_msgs/Pose geometry_msgs/Point "
+     "geometry_msgs/Quaternion",
+     ""},
+    {"geometry_msgs/PoseStamped", "std_msgs/Header header\ngeometry_msgs/Pose pose\n", "", ""},
+    {"visualization_msgs/MarkerArray", "visualization_msgs/Marker[] markers\n",
+     "visualization_msgs/Marker std_msgs/Header geometry_msgs/Pose geometry_msgs/Point "
+     "geometry_msgs/Quaternion geometry_msgs/Vector3 std_msgs/ColorRGBA builtin_interfaces/Duration "
+     "sensor_msgs/CompressedImage visualization_msgs/UVCoordinate visualization_msgs/MeshFile",
+     ""},
+    {"visualization_msgs/Marker",
+     "int32 CUBE_LIST=6\nint32 ADD=0\nint32 DELETE=2\nint32 DELETEALL=3\nstd_msgs/Header header\nstring "
+     "ns\nint32 id\nint32 type\nint32 action\ngeometry_msgs/Pose pose\ngeometry_msgs/Vector3 "
+     "scale\nstd_msgs/ColorRGBA color\nbuiltin_interfaces/Duration lifetime\nbool "
+     "frame_locked\ngeometry_msgs/Point[] points\nstd_msgs/ColorRGBA[] colors\nstring "
+     "texture_resource\nsensor_msgs/CompressedImage texture\nvisualization_msgs/UVCoordinate[] "
+     "uv_coordinates\nstring text\nstring mesh_resource\nvisualization_msgs/MeshFile mesh_file\nbool "
+     "mesh_use_embedded_materials\n",
+     "", ""},
+    {"visualization_msgs/UVCoordinate", "float32 u\nfloat32 v\n", "", ""},
+    {"visualization_msgs/MeshFile", "string filename\nuint8[] data\n", "", ""},
+    {"std_msgs/ColorRGBA", "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n", "", ""},
+    {"builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n", "", ""},
+    {"diagnostic_msgs/DiagnosticArray", "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n",
+     "std_msgs/Header diagnostic_msgs/DiagnosticStatus diagnostic_msgs/KeyValue", ""},
+    {"diagnostic_msgs/DiagnosticStatus",
+     "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\nstring name\nstring message\nstring "
+     "hardware_id\ndiagnostic_msgs/KeyValue[] values\n",
+     "", ""},
+    {"diagnostic_msgs/KeyValue", "string key\nstring value\n", "", ""},
 }};
 constexpr std::string_view kVector = "float64 x\nfloat64 y\nfloat64 z\n";
 

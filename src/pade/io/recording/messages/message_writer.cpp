@@ -72,8 +72,9 @@ void MessageWriter::quaternion(const Eigen::Quaterniond& rotation) {
 
 std::string write_image(const MessageHeader& header, const cv::Mat& image, MessageEncoding encoding) {
   const bool deep = image.depth() == CV_16U;
-  const std::string_view name =
-      image.channels() == 3 ? (deep ? "bgr16" : "bgr8") : (deep ? "mono16" : "mono8");
+  const std::string_view name = image.depth() == CV_32F ? "32FC1"
+                                : image.channels() == 3 ? (deep ? "bgr16" : "bgr8")
+                                                        : (deep ? "mono16" : "mono8");
   const std::size_t row = static_cast<std::size_t>(image.cols) * image.elemSize();
   MessageWriter out(encoding);
   out.header(header);
@@ -141,12 +142,19 @@ std::string write_pose_with_covariance(const MessageHeader& header, const Pose& 
 
 std::string write_transform(const MessageHeader& header, std::string_view child, const Pose& pose,
                             MessageEncoding encoding) {
+  const NamedTransform transform{header, std::string(child), pose};
+  return write_transforms(std::span(&transform, 1), encoding);
+}
+
+std::string write_transforms(std::span<const NamedTransform> transforms, MessageEncoding encoding) {
   MessageWriter out(encoding);
-  out.number(std::uint32_t{1});
-  out.header(header);
-  out.text(child);
-  out.vector(pose.translation);
-  out.quaternion(pose.rotation);
+  out.number(static_cast<std::uint32_t>(transforms.size()));
+  for (const NamedTransform& transform : transforms) {
+    out.header(transform.header);
+    out.text(transform.child);
+    out.vector(transform.pose.translation);
+    out.quaternion(transform.pose.rotation);
+  }
   return out.take();
 }
 

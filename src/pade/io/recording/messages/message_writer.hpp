@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -44,8 +45,16 @@ class MessageWriter {
   MessageEncoding encoding_;
 };
 
+/// A coordinate frame in another.
+struct NamedTransform {
+  MessageHeader header;  ///< its frame is the parent
+  std::string child;
+  Pose pose;  ///< of the child in the parent
+};
+
 /// @{
 /// Whole messages; the names are those of the types.
+/// @param image  8 or 16 bit, grey or BGR; or CV_32FC1
 std::string write_image(const MessageHeader& header, const cv::Mat& image, MessageEncoding encoding);
 /// @param format  "png", "jpeg"
 std::string write_compressed_image(const MessageHeader& header, std::string_view format,
@@ -60,6 +69,7 @@ std::string write_pose_with_covariance(const MessageHeader& header, const Pose& 
 /// One transform.
 std::string write_transform(const MessageHeader& header, std::string_view child, const Pose& pose,
                             MessageEncoding encoding);
+std::string write_transforms(std::span<const NamedTransform> transforms, MessageEncoding encoding);
 std::string write_imu(const MessageHeader& header, const Eigen::Vector3d& angular_rate,
                       const Eigen::Vector3d& specific_force, MessageEncoding encoding);
 /// @param place  latitude, longitude (degrees), height (m); `covariance` east, north, up, m²

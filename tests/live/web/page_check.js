@@ -1,0 +1,159 @@
+// Looks at the page in headless Chromium while build/tests/live/web_session runs, and compares what it shows with
+// health.json and with the messages themselves. scripts/web-oracle starts it: PROGRAM FLIGHT PICTURE.
+const { spawn } = require('child_process')
+const fs = require('fs')
+const http = require('http')
+const os = require('os')
+const path = require('path')
+const WebSocket = require('ws')
+
+const [program, flight, picture] = process.argv.slice(2)
+const port = 18765
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms))
+let bad = 0
+function check (what, good, text) {
+  if (!good) ++bad
+  console.log(`${good ? 'ok  ' : 'BAD '} ${what}: ${text}`)
+}
+
+function get (url) {
+  return new Promise((resolve, reject) => http.get(url, (answer) => {
+    let body = ''
+    answer.on('data', (part) => { body += part })
+    answer.on('end', () => resolve(body))
+  }).on('error', reject))
+}
+
+/// Waits until something is so; null after so many seconds.
+async function until (seconds, question) {
+  for (const end = Date.now() + 1000 * seconds; Date.now() < end; await sleep(20)) {
+    const answer = await question()
+    if (answer) return answer
+  }
+  return null
+}
+
+class Browser {
+  async open (url) {
+    this.folder = fs.mkdtempSync(path.join(os.tmpdir(), 'pade-page-'))
+    this.process = spawn('chromium', ['--headless=new', '--no-sandbox', '--use-gl=angle',
+      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--window-size=1000,900', '--remote-debugging-port=0',
+      `--user-data-dir=${this.folder}`, 'about:blank'], { stdio: 'ignore' })
+    const file = path.join(this.folder, 'DevToolsActivePort')
+    const found = await until(60, () => fs.existsSync(file) && fs.readFileSync(file, 'utf8').split('\n')[0])
+    const pages = JSON.parse(await get(`http://127.0.0.1:${found}/json`))
+    this.socket = new WebSocket(pages.find((page) => page.type === 'page').webSocketDebuggerUrl)
+    await new Promise((resolve) => this.socket.on('open', resolve))
+    this.waiting = new Map()
+    this.errors = []
+    this.count = 0
+    this.socket.on('message', (text) => {
+      const message = JSON.parse(text)
+      if (message.method === 'Runtime.exceptionThrown') this.errors.push(message.params.exceptionDetails)
+      if (this.waiting.has(message.id)) this.waiting.get(message.id)(message.result)
+    })
+    await this.tell('Runtime.enable')
+    await this.tell('Page.enable')
+    await this.tell('Page.navigate', { url })
+  }
+
+  tell (method, params = {}) {
+    const id = ++this.count
+    return new Promise((resolve) => {
+      this.waiting.set(id, resolve)
+      this.socket.send(JSON.stringify({ id, method, params }))
+    })
+  }
+
+  async value (expression) {
+    const answer = await this.tell('Runtime.evaluate', { expression, returnByValue: true })
+    return answer.result.value
+  }
+
+  async shot (file) {
+    const { data } = await this.tell('Page.captureScreenshot', { format: 'png' })
+    fs.writeFileSync(file, Buffer.from(data, 'base64'))
+  }
+
+  close () {
+    if (this.socket) this.socket.close()
+    if (this.process) this.process.kill()
+    fs.rmSync(this.folder, { recursive: true, force: true, maxRetries: 5 })
+  }
+}
+
+const shown = `(() => {
+  const rows = [...document.querySelectorAll('#health tr')].map((row) => [...row.cells].map((cell) => cell.textContent))
+  const bright = (id) => {
+    const image = document.getElementById(id)
+    if (!image.naturalWidth) return 0
+    const canvas = document.createElement('canvas')
+    canvas.width = canvas.height = 32
+    const g = canvas.getContext('2d')
+    g.drawImage(image, 0, 0, 32, 32)
+    const data = [...g.getImageData(0, 0, 32, 32).data]
+    return Math.max(...data.filter((_, i) => i % 4 !== 3)) - Math.min(...data.filter((_, i) => i % 4 !== 3))
+  }
+  return { rows, state: document.getElementById('state').textContent, note: document.getElementById('mapnote').textContent,
+    old: document.getElementById('obstacles').className, obstacles: bright('obstacles'), depth: bright('depth'),
+    voxels: pade.voxels, path: pade.path.length, counts: pade.counts,
+    sectors: pade.sectors && pade.sectors.ranges.map((range) => Number.isNaN(range) ? 'unknown' : range === Infinity ? 'free' : range.toFixed(2)) }
+})()`
+
+const browser = new Browser()
+let session = null
+
+async function main () {
+  session = spawn(program, [flight, String(port), '300', '5'], { stdio: ['ignore', 'pipe', 'inherit'] })
+  await new Promise((resolve) => session.stdout.once('data', resolve))
+  await browser.open(`http://127.0.0.1:${port}/`)
+  const well = await until(60, async () => {
+    const page = await browser.value(shown)
+    return page && page.voxels > 0 && page.path > 1 && page.sectors && page.obstacles && page.depth ? page : null
+  })
+  check('everything comes', well, well ? `voxels ${well.voxels}, path ${well.path}` : 'not within 60 s')
+  await sleep(10000)
+  const page = await until(5, async () => {
+    const now = await browser.value(shown)
+    return now.obstacles > 50 && now.depth > 50 ? now : null
+  }) || await browser.value(shown)
+  check('pictures', page.obstacles > 50 && page.depth > 50, `contrast ${page.obstacles}, ${page.depth}`)
+  check('sectors', page.sectors.length === 72 && page.sectors.some((range) => !isNaN(range)), page.sectors.slice(68).concat(page.sectors.slice(0, 5)).join(' '))
+  check('3-D view', page.note === '', page.note || 'drawn')
+  await browser.shot(picture)
+  await browser.value(`window.setInterval(() => {
+    const state = document.getElementById('state').textContent
+    if (!window.seenAt && state === 'no image from the camera') window.seenAt = Date.now()
+  }, 10)`)
+  session.kill('SIGUSR1')
+  const asked = Date.now()
+  const seen = await until(20, () => browser.value('window.seenAt'))
+  check('a camera that stands still is seen', seen && seen - asked <= 1000, `after ${(seen - asked) / 1000} s`)
+  if (!seen) console.log(JSON.stringify(await browser.value(shown)), await get(`http://127.0.0.1:${port}/health.json`))
+  const old = await until(5, async () => (await browser.value(shown)).old === 'old')
+  check('its picture is shown as old', old, String(old))
+  await browser.shot(picture.replace('.png', '-stalled.png'))
+  // The same numbers are on the page and in health.json, once both are of the same moment.
+  const same = await until(5, async () => {
+    const json = JSON.parse(await get(`http://127.0.0.1:${port}/health.json`))
+    const now = await browser.value(shown)
+    const values = Object.entries(json.values)
+    const equal = values.every(([key, value]) => now.rows.some(([name, text]) => name === key.replace(/_/g, ' ') && text === value))
+    return equal && now.state === json.message && String(now.voxels) === json.values.voxels_occupied ? values.length : 0
+  })
+  check('health is that of health.json', same, `${same} values, voxels among them`)
+  session.kill()
+  const lost = await until(5, async () => (await browser.value(shown)).state === 'no connection to pade live')
+  check('a session that ends is seen', lost, String(lost))
+  check('no errors in the page', browser.errors.length === 0, JSON.stringify(browser.errors.slice(0, 2)))
+  console.log(`messages on the page: ${JSON.stringify(page.counts)}`)
+}
+
+main().catch((failure) => {
+  console.error(failure)
+  bad = 1
+}).then(() => {
+  browser.close()
+  session.kill()
+  process.exit(bad === 0 ? 0 : 1)
+})
