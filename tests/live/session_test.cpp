@@ -44,6 +44,12 @@ class EastwardPoses : public NavigationSource {
   std::atomic<double> late{0};   // s
   std::atomic<double> burst{0};  // s from message to message
   std::atomic<std::size_t> jumped{0};
+  [[nodiscard]] std::optional<Matrix6d> motion_covariance(Time t1, Time t2,
+                                                          const Pose& /*camera*/) const override {
+    if (!known_motion) return std::nullopt;
+    return Matrix6d(seconds_between(t1, t2) * Matrix6d::Identity());
+  }
+  bool known_motion = false;
 
  private:
   Time zero_;
@@ -61,6 +67,18 @@ class Gatherer : public Sink {
   std::vector<double> ages;
   LiveUpdate last;
   std::atomic<int> pause{0};  // ms
+};
+
+/// What goes into the mapper.
+class Covariances : public InputSink {
+ public:
+  void take(const MapperInput& input) override {
+    times.push_back(input.time);
+    covariances.push_back(input.covariance);
+  }
+  void begin_anew() override {}
+  std::vector<Time> times;
+  std::vector<Matrix6d> covariances;
 };
 
 /// A session for some seconds.
@@ -111,6 +129,22 @@ TEST(Session, MapsTheWallAhead) {
   EXPECT_EQ(distances[36], kUnknownDistance);  // behind
   EXPECT_GT(bed.progress.depth, 0);
   EXPECT_TRUE(bed.session->map().bounds().max().y() > 2.5);
+}
+
+/// A source of poses that knows how good its motions are is believed; else the options are.
+TEST(Session, TheMotionIsAsGoodAsItsSourceSays) {
+  for (const bool known : {true, false}) {
+    Covariances seen;
+    Bed bed(10, &seen);
+    bed.poses.known_motion = known;
+    bed.run(1, [](double) {});
+    ASSERT_GT(seen.times.size(), 2U);
+    for (std::size_t i = 1; i < seen.times.size(); ++i) {
+      const double dt = seconds_between(seen.times[i - 1], seen.times[i]);
+      const double variance = known ? dt : 0.02 * 0.02 * dt * dt;
+      EXPECT_NEAR(seen.covariances[i](0, 0), variance, 1e-6 * variance) << i;
+    }
+  }
 }
 
 TEST(Session, AFrameWhosePoseDoesNotComeIsSkippedAfterItsTime) {

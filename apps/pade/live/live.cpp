@@ -81,16 +81,20 @@ Result<LiveParts> open_parts(const LiveArguments& arguments) {
   if (!camera) return camera.error();
   auto port = live::open_port(options->link.port, options->link.baud);
   if (!port) return port.error();
-  auto link = std::make_unique<live::AutopilotLink>(std::move(*port), options->link);
+  auto link = std::make_unique<live::AutopilotLink>(std::move(*port), options->link, options->navigator);
   return LiveParts{std::move(*options), std::move(*camera), std::move(link)};
 }
 
 /// What a link carries each second against what it can, for who has to choose its speed.
 std::string link_load(const live::LiveOptions& options) {
   constexpr double kSectors = 179, kAttitude = 44, kPosition = 40, kOdometry = 245, kClock = 30;  // bytes
-  const bool odometry = options.link.poses == live::PoseMessages::odometry;
-  const double poses = options.link.pose_rate * (odometry ? kOdometry : kAttitude + kPosition);
-  const double out = options.camera.rate * kSectors + 10 * kClock;
+  constexpr double kImu = 100 * 75, kFix = 5 * 64;  // bytes per second of HIGHRES_IMU and GPS_RAW_INT
+  constexpr double kPoints = 2 * 10 * 40;           // of ten faces, twice
+  double poses = options.link.pose_rate * (kAttitude + kPosition);
+  if (options.link.poses == live::PoseMessages::odometry) poses = options.link.pose_rate * kOdometry;
+  if (options.link.poses == live::PoseMessages::sensors) poses = kImu + kFix;
+  const bool faces = options.link.obstacles == live::ObstacleMessages::faces;
+  const double out = options.camera.rate * (faces ? kPoints : kSectors) + 10 * kClock;
   const double in = poses + 10 * kClock;
   if (!options.link.port.starts_with("/")) {
     return fmt::format("{:.1f} kB/s in, {:.1f} kB/s out", 1e-3 * in, 1e-3 * out);
@@ -137,11 +141,13 @@ Status check_parts(LiveParts& parts) {
                 link.synchronised ? fmt::format("errs by at most {:.1f} ms", 1e3 * link.clock_bound)
                                   : "no answer to TIMESYNC") &&
          good;
-  good = report("poses", link.poses_come,
-                link.refused.empty() || link.poses_come
-                    ? fmt::format("{} attitudes, {} positions", link.attitudes, link.positions)
-                    : "the autopilot refused " + link.refused) &&
-         good;
+  good =
+      report("poses", link.poses_come,
+             link.refused.empty() || link.poses_come
+                 ? link.poses_missing.empty() ? link.poses_summary
+                                              : fmt::format("{} ({})", link.poses_missing, link.poses_summary)
+                 : fmt::format("the autopilot refused {}", link.refused)) &&
+      good;
   fmt::print("  {:<10} {:<8} {}\n", "link load", "", link_load(parts.options));
   return good ? Status() : Status(Error{"something is missing (see above)"});
 }
@@ -156,13 +162,13 @@ class Web {
   static Result<std::unique_ptr<Web>> open(const LiveParts& parts, const live::Progress& progress) {
     const live::LiveOptions& options = parts.options;
     auto web = std::make_unique<Web>();
-    const auto question = [&link = *parts.link, &progress, poses = options.link.poses, raw = web.get()] {
+    const auto question = [&link = *parts.link, &progress, raw = web.get()] {
       live::HealthInputs inputs;
       inputs.now = live::now_of_ours();
       inputs.image = progress.image;
       inputs.depth = progress.depth;
       inputs.link = link.report();
-      inputs.missing = live::text_of(inputs.link, poses);
+      inputs.missing = live::text_of(inputs.link);
       constexpr double kLongest = 0.4;  // s
       const bool no_image = inputs.image == 0 || seconds_between({inputs.image}, inputs.now) > kLongest;
       if (inputs.link.missing == live::Missing::autopilot && no_image)
@@ -215,7 +221,6 @@ class Web {
 /// A line each five seconds, for the log.
 class LiveLog {
  public:
-  explicit LiveLog(live::PoseMessages poses) : poses_(poses) {}
   void maybe(const live::Progress& progress, const live::LinkReport& link, const std::string& stamps,
              const Web* web) {
     constexpr double kPause = 5;  // s
@@ -227,14 +232,13 @@ class LiveLog {
                        : fmt::format("{:.2f} s old", 1e-9 * static_cast<double>(now.nanoseconds - then));
     };
     say(fmt::format("{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
-                    live::text_of(link, poses_), age(progress.image), age(progress.depth), link.sectors_sent,
+                    live::text_of(link), age(progress.image), age(progress.depth), link.sectors_sent,
                     link.in.packets, link.in.bad, link.in.gaps));
     if (!stamps.empty()) say(stamps + "\n");
     if (web != nullptr) say(web->text() + "\n");
   }
 
  private:
-  live::PoseMessages poses_;
   Time last_ = live::now_of_ours();
 };
 
@@ -316,6 +320,8 @@ Status run_live(const LiveArguments& arguments) {
   if (arguments.check) return check_parts(*parts);
   const auto sight = live::SectorView::of(parts->camera.source->camera(), parts->camera.T_body_camera);
   live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth, sight);
+  if (options.link.obstacles == live::ObstacleMessages::faces)
+    sectors.see_points(parts->camera.source->camera(), parts->camera.T_body_camera);
   std::vector<live::Sink*> sinks{&sectors};
   std::optional<live::MapSaver> saver;
   if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
@@ -339,7 +345,7 @@ Status run_live(const LiveArguments& arguments) {
   const live::ServiceManager service;
   {
     const LinkThread thread(*parts->link, progress);
-    LiveLog log(options.link.poses);
+    LiveLog log;
     Pulse pulse(service, thread);
     service.ready();
     const Time start = live::now_of_ours();

@@ -19,8 +19,6 @@ using Eigen::Vector3d;
 using mavlink::Frame;
 using mavlink::unpack;
 
-constexpr std::uint8_t kArduPilot = 3;
-constexpr std::uint8_t kPx4 = 12;
 constexpr double kMilliG = 9.80665e-3;
 constexpr double kMilli = 1e-3;
 constexpr double kDegree = std::numbers::pi / 180;
@@ -69,8 +67,8 @@ auto take_first(Channels& sources) {
 }  // namespace
 
 std::string name_of(const Autopilot& autopilot) {
-  if (autopilot.kind == kArduPilot) return "ArduPilot";
-  if (autopilot.kind == kPx4) return "PX4";
+  if (autopilot.kind == ardupilot_kind) return "ArduPilot";
+  if (autopilot.kind == px4_kind) return "PX4";
   return fmt::format("autopilot {}", autopilot.kind);
 }
 
@@ -101,7 +99,7 @@ void SensorGatherer::add(const Frame& frame) {
       return add_integers(*message, from_milliseconds(message->time_boot_ms), scaled);
     }
     case mavlink::RawImu::kId: {
-      if (autopilot_.kind != kArduPilot) {
+      if (autopilot_.kind != ardupilot_kind) {
         ++unitless_;
         return;
       }

@@ -20,6 +20,9 @@ namespace pade::live {
 /// What lies between slower samples of an IMU is lost, Hz.
 inline constexpr double slowest_imu = 20;
 
+inline constexpr std::uint8_t ardupilot_kind = 3;  ///< MAV_AUTOPILOT
+inline constexpr std::uint8_t px4_kind = 12;       ///< the same
+
 /// Who flies the vehicle.
 struct Autopilot {
   std::uint8_t system = 0;     ///< its number on the link

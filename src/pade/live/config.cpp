@@ -43,6 +43,7 @@ Status check(const LiveOptions& options) {
   if (!recordable)
     return Error{
         fmt::format("record: found \"{}\", expected a name that ends in .mcap or .bag", options.record)};
+  if (const Status status = within("navigator", navigation::check(options.navigator)); !status) return status;
   return within("mapper", check(options.mapper));
 }
 

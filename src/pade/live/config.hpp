@@ -45,6 +45,7 @@ struct CameraOptions {
 struct LiveOptions {
   CameraOptions camera;
   LinkOptions link;
+  navigation::NavigatorOptions navigator;  ///< of our own filter (link.poses: sensors)
   SessionOptions session;
   SectorOptions sectors;
   ObstacleMapperOptions mapper;
@@ -57,6 +58,7 @@ struct LiveOptions {
   static void visit(Self& self, Visitor&& field) {
     field("camera", self.camera, "where frames come from");
     field("link", self.link, "the autopilot");
+    field("navigator", self.navigator, "our own filter, for link.poses: sensors");
     field("session", self.session, "how frames and poses meet");
     field("sectors", self.sectors, "what is sent as OBSTACLE_DISTANCE");
     field("mapper", self.mapper, "depth and map");

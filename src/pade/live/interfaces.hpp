@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <opencv2/core.hpp>
@@ -11,7 +12,7 @@
 #include "pade/core/camera.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/time.hpp"
-#include "pade/live/link/autopilot_poses.hpp"
+#include "pade/live/link/pose_source.hpp"
 #include "pade/mapping/query/map_view.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 
@@ -57,6 +58,12 @@ class NavigationSource {
 
   /// The pose of the body at a time.
   [[nodiscard]] virtual PoseAnswer pose_at(Time time) const = 0;
+  /// Covariance of the camera's motion between two times, as Frame::motion_covariance has it. Empty where the
+  /// source does not know it.
+  [[nodiscard]] virtual std::optional<Matrix6d> motion_covariance(Time /*t1*/, Time /*t2*/,
+                                                                  const Pose& /*T_body_camera*/) const {
+    return std::nullopt;
+  }
 };
 
 /// What a frame has changed.

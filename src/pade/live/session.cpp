@@ -15,6 +15,7 @@
 
 #include "pade/core/option_check.hpp"
 #include "pade/live/camera/folder_source.hpp"
+#include "pade/live/link/obstacle_points.hpp"
 
 namespace pade::live {
 namespace {
@@ -127,9 +128,14 @@ void SectorSink::take(const LiveUpdate& update) {
   const auto distances = obstacle_distances(*update.view, update.T_world_body, options_, view_);
   const bool says_anything =
       std::any_of(distances.begin(), distances.end(), [](std::uint16_t d) { return d != kUnknownDistance; });
-  std::optional<mavlink::ObstacleDistance> message;
-  if (says_anything) message = obstacle_distance_message(distances, update.time, options_);
-  link_.offer(message, update.time);
+  std::optional<FrameObstacles> obstacles;
+  if (says_anything) {
+    obstacles = FrameObstacles{obstacle_distance_message(distances, update.time, options_), {}, options_};
+    if (eye_)
+      obstacles->points =
+          obstacle_points(*update.view, update.T_world_body, options_, eye_->camera, eye_->T_body_camera);
+  }
+  link_.offer(obstacles, update.time);
   if (listener) listener(distances, update.time);
 }
 
@@ -193,9 +199,25 @@ void Session::skip(const std::string& reason) {
   ++counts_.reasons[reason];
 }
 
+Time Session::time_of_pose(Time frame) const {
+  return {frame.nanoseconds + static_cast<std::int64_t>(options_.time_offset * 1e9)};
+}
+
 PoseAnswer Session::pose_of(const LiveFrame& frame) const {
-  return parts_.poses.pose_at(
-      {frame.time.nanoseconds + static_cast<std::int64_t>(options_.time_offset * 1e9)});
+  return parts_.poses.pose_at(time_of_pose(frame.time));
+}
+
+/// Of the motion since the last frame that was mapped: what the source of poses knows, else what the options
+/// say.
+Matrix6d Session::covariance_of(const LiveFrame& frame) const {
+  const auto known =
+      parts_.poses.motion_covariance(time_of_pose(last_), time_of_pose(frame.time), parts_.T_body_camera);
+  if (known) return *known;
+  Matrix6d covariance = Matrix6d::Zero();
+  const double way = options_.velocity_sigma * std::clamp(seconds_between(last_, frame.time), 0.0, 1.0);
+  covariance.diagonal().head<3>().setConstant(way * way);
+  covariance.diagonal().tail<3>().setConstant(options_.rotation_sigma * options_.rotation_sigma);
+  return covariance;
 }
 
 /// Frames that have their poses are mapped in their order as long as the newest of them will still be worth
@@ -252,10 +274,7 @@ void Session::begin_anew() {
 }
 
 void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
-  Matrix6d covariance = Matrix6d::Zero();
-  const double way = options_.velocity_sigma * std::clamp(seconds_between(last_, frame.time), 0.0, 1.0);
-  covariance.diagonal().head<3>().setConstant(way * way);
-  covariance.diagonal().tail<3>().setConstant(options_.rotation_sigma * options_.rotation_sigma);
+  const Matrix6d covariance = covariance_of(frame);
   const Pose T_world_camera = camera_pose(T_world_body, parts_.T_body_camera);
   if (parts_.recorder != nullptr)
     parts_.recorder->take({frame.image, frame.time, T_world_camera, covariance});

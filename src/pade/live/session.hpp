@@ -64,6 +64,9 @@ class SectorSink : public Sink {
              const SectorView& view = {})
       : link_(link), options_(options), least_depth_(least_depth), view_(view) {}
   void take(const LiveUpdate& update) override;
+  /// Obstacles as points too, of what this camera sees.
+  /// @param camera  undistorted
+  void see_points(const Camera& camera, const Pose& T_body_camera) { eye_ = Eye{camera, T_body_camera}; }
   /// Told of all distances before they are turned to the newest heading; the mapper's thread. To be set
   /// before the session runs.
   std::function<void(const std::array<std::uint16_t, kBins>& distances, Time frame)> listener;
@@ -71,8 +74,13 @@ class SectorSink : public Sink {
  private:
   AutopilotLink& link_;
   SectorOptions options_;
+  struct Eye {
+    Camera camera;
+    Pose T_body_camera;
+  };
   double least_depth_;
   SectorView view_;
+  std::optional<Eye> eye_;
 };
 
 /// What a session works with; all must outlive it.
@@ -114,7 +122,9 @@ class Session {
       : parts_(parts), options_(options), mapper_options_(mapper), mapper_(std::move(made)) {}
   bool map_next(std::vector<LiveFrame>& waiting, Time now);
   void pass_over_old(std::vector<LiveFrame>& waiting, Time now);
+  [[nodiscard]] Time time_of_pose(Time frame) const;
   [[nodiscard]] PoseAnswer pose_of(const LiveFrame& frame) const;
+  [[nodiscard]] Matrix6d covariance_of(const LiveFrame& frame) const;
   void map_frame(const LiveFrame& frame, const Pose& T_world_body);
   void skip(const std::string& reason);
   void pass(const LiveFrame& frame);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <deque>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -49,7 +50,7 @@ class LoopPort : public Port {
 /// An autopilot that flies north at 2 m/s, heading north, and whose clock is 1000 s behind ours.
 class Bench {
  public:
-  Bench() : link_(std::make_unique<LoopPort>(line_), {}) {}
+  explicit Bench(const LinkOptions& options = {}) : link_(std::make_unique<LoopPort>(line_), options) {}
 
   /// Goes on in steps of 10 ms of our clock.
   void run(double seconds) {
@@ -60,7 +61,7 @@ class Bench {
       if (depth) progress_.depth = now_.nanoseconds - 120 * kMillisecond;
       const std::int64_t ms = now_.nanoseconds / kMillisecond;
       const auto boot = static_cast<std::uint32_t>(ms - 1'000'000);
-      if (heartbeat && ms % 1000 == 0) tell(mavlink::Heartbeat{2, 12, 0, 0, 4, 3});
+      if (heartbeat && ms % 1000 == 0) tell(mavlink::Heartbeat{2, kind, 0, 0, 4, 3});
       if (poses && ms % 20 == 0) {
         const double half = 0.5e-3 * turn_rate * static_cast<double>(ms % 1'000'000);
         tell(mavlink::AttitudeQuaternion{boot,
@@ -96,6 +97,7 @@ class Bench {
         sectors.push_back(now_);
         last_sectors = *m;
       }
+      if (const auto m = mavlink::unpack<mavlink::ObstacleDistance3d>(frame)) points.push_back(*m);
       if (const auto m = mavlink::unpack<mavlink::CommandLong>(frame)) {
         commands.push_back(*m);
         tell(mavlink::CommandAck{m->command, ack});
@@ -111,9 +113,11 @@ class Bench {
 
   bool heartbeat = true, poses = true, questions = false, answers = true;
   bool camera = true, mapper = true, depth = true, positions = true;
+  std::uint8_t kind = px4_kind;
   std::uint8_t ack = 0;
   double turn_rate = 0;  ///< clockwise, rad/s
   mavlink::ObstacleDistance last_sectors;
+  std::vector<mavlink::ObstacleDistance3d> points;
 
   /// What we sent, by time.
   struct Said {
@@ -239,10 +243,10 @@ TEST(AutopilotLink, NamesHoverWhereThereIsNoDepth) { expect_said(&Bench::depth, 
 TEST(AutopilotLink, SectorsAreSentOnceAndNeverOld) {
   Bench bench;
   bench.run(5);
-  bench.link().offer(mavlink::ObstacleDistance{}, {bench.now().nanoseconds - 100 * kMillisecond});
+  bench.link().offer(FrameObstacles{}, {bench.now().nanoseconds - 100 * kMillisecond});
   bench.run(1);
   EXPECT_EQ(bench.sectors.size(), 1U);
-  bench.link().offer(mavlink::ObstacleDistance{}, {bench.now().nanoseconds - 350 * kMillisecond});
+  bench.link().offer(FrameObstacles{}, {bench.now().nanoseconds - 350 * kMillisecond});
   bench.run(1);
   EXPECT_EQ(bench.sectors.size(), 1U);
   EXPECT_EQ(bench.link().report().sectors_stale, 1U);
@@ -259,7 +263,7 @@ TEST(AutopilotLink, SectorsAreTurnedToTheHeadingAtWhichTheyLeave) {
     message.increment = 5;
     message.distances.fill(65535);
     message.distances[3] = 250;
-    bench.link().offer(message, {bench.now().nanoseconds - 250 * kMillisecond});
+    bench.link().offer(FrameObstacles{message, {}, {}}, {bench.now().nanoseconds - 250 * kMillisecond});
     bench.run(0.01);
     ASSERT_EQ(bench.sectors.size(), 1U);
     const auto found =
@@ -285,7 +289,7 @@ TEST(AutopilotLink, IsNotActiveWhileItsSectorsAreTooOldToBeSent) {
   Bench bench;
   bench.run(5);
   for (int i = 0; i < 20; ++i) {
-    bench.link().offer(mavlink::ObstacleDistance{}, {bench.now().nanoseconds - 350 * kMillisecond});
+    bench.link().offer(FrameObstacles{}, {bench.now().nanoseconds - 350 * kMillisecond});
     bench.run(0.1);
   }
   EXPECT_EQ(bench.link().report().missing, Missing::late);
@@ -313,10 +317,75 @@ TEST(AutopilotLink, NamesTheMessageThatThePosesLack) {
   bench.run(5);
   const LinkReport report = bench.link().report();
   EXPECT_FALSE(report.poses_come);
-  EXPECT_GT(report.attitudes, 100U);
-  EXPECT_EQ(report.positions, 0U);
+  EXPECT_EQ(report.poses, 0U);
+  EXPECT_THAT(report.poses_summary, ::testing::MatchesRegex("[1-9][0-9][0-9]+ attitudes, 0 positions"));
   EXPECT_THAT(bench.texts.back().second, HasSubstr("no LOCAL_POSITION_NED"));
   EXPECT_GE(bench.commands.size(), 4U) << "plenty of attitudes are no reason to stop asking for positions";
+}
+
+/// They are of the exposure, a quarter of a second ago; in the meantime the vehicle has moved and turned.
+TEST(AutopilotLink, PointsAreThoseOfWhereTheVehicleIsByNow) {
+  LinkOptions options;
+  options.obstacles = ObstacleMessages::faces;
+  for (const double degrees : {0.0, 40.0}) {
+    Bench bench(options);
+    bench.kind = ardupilot_kind;
+    bench.turn_rate = degrees * std::numbers::pi / 180;
+    bench.run(5);
+    bench.link().offer(FrameObstacles{{}, {Eigen::Vector3d(5, 0, 0), Eigen::Vector3d(6, 0, 4)}, {}},
+                       {bench.now().nanoseconds - 250 * kMillisecond});
+    bench.run(0.01);
+    EXPECT_TRUE(bench.sectors.empty());
+    ASSERT_EQ(bench.points.size(), 4U) << "two faces, twice";
+    EXPECT_NE(bench.points[0].time_boot_ms, bench.points[2].time_boot_ms);
+    const auto level =
+        std::min_element(bench.points.begin(), bench.points.end(),
+                         [](const auto& a, const auto& b) { return std::abs(a.z) < std::abs(b.z); });
+    // Clockwise by some 10 degrees, so what was ahead is to the left; 2 m/s to the north, where it looked
+    // when the clock began.
+    const Eigen::Vector2d now(static_cast<double>(level->x), static_cast<double>(level->y));
+    EXPECT_NEAR(level->z, 0, 1e-3);
+    if (degrees == 0) {
+      EXPECT_NEAR((now - Eigen::Vector2d(4.5, 0)).norm(), 0, 0.1);
+    } else {
+      EXPECT_NEAR(std::atan2(now.y(), now.x()) * 180 / std::numbers::pi, -10, 7);
+    }
+    EXPECT_EQ(bench.link().report().sectors_sent, 1U);
+    EXPECT_FALSE(bench.link().report().level_instead);
+  }
+}
+
+TEST(AutopilotLink, PointsThatAnAutopilotDoesNotKnowAreSentAsDistancesAndThatIsSaid) {
+  LinkOptions options;
+  options.obstacles = ObstacleMessages::faces;
+  Bench bench(options);
+  bench.run(5);
+  bench.link().offer(FrameObstacles{{}, {Eigen::Vector3d(5, 0, 0)}, {}}, bench.now());
+  bench.run(0.1);
+  EXPECT_TRUE(bench.points.empty());
+  EXPECT_EQ(bench.sectors.size(), 1U);
+  EXPECT_TRUE(bench.link().report().level_instead);
+}
+
+TEST(AutopilotLink, OurOwnFilterAsksForSensorsAndSaysWhichIsMissing) {
+  LinkOptions options;
+  options.poses = PoseMessages::sensors;
+  for (const std::uint8_t kind : {px4_kind, ardupilot_kind}) {
+    Bench bench(options);
+    bench.kind = kind;
+    bench.run(5);
+    const auto asked = [&](std::uint32_t id) {
+      return std::any_of(bench.commands.begin(), bench.commands.end(), [&](const mavlink::CommandLong& c) {
+        return c.command == 511 && c.param1 == static_cast<float>(id);
+      });
+    };
+    EXPECT_EQ(asked(105), kind == px4_kind) << "HIGHRES_IMU";
+    EXPECT_EQ(asked(27), kind == ardupilot_kind) << "RAW_IMU";
+    EXPECT_TRUE(asked(24)) << "GPS_RAW_INT";
+    EXPECT_FALSE(asked(31)) << "ATTITUDE_QUATERNION";
+    EXPECT_FALSE(bench.link().report().poses_come);
+    EXPECT_THAT(bench.texts.back().second, HasSubstr("no pose: no IMU message"));
+  }
 }
 
 TEST(AutopilotLink, TakesAnotherAutopilotOnceTheFirstIsGone) {

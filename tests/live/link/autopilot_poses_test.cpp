@@ -2,6 +2,7 @@
 #include "pade/live/link/autopilot_poses.hpp"
 
 #include <cmath>
+#include <memory>
 #include <numbers>
 
 #include <gtest/gtest.h>
@@ -128,7 +129,8 @@ TEST(AutopilotPoses, OdometryThatHasFailedIsNoPose) {
 /// Without a counter of resets, as in LOCAL_POSITION_NED: a step that the velocity does not explain.
 TEST(AutopilotPoses, AStepThatItsVelocityDoesNotExplainIsAJump) {
   const auto flown = [](float step, float speed, float turn) {
-    AutopilotPoses poses(PoseMessages::estimate);
+    auto made = std::make_unique<AutopilotPoses>(PoseMessages::estimate);
+    AutopilotPoses& poses = *made;
     float north = 0;
     for (std::uint32_t ms = 1000; ms < 2000; ms += 40) {
       north += 0.04F * speed;
@@ -137,18 +139,18 @@ TEST(AutopilotPoses, AStepThatItsVelocityDoesNotExplainIsAJump) {
       add_to(poses, mavlink::AttitudeQuaternion{ms, std::cos(half), 0, 0, std::sin(half), 0, 0, 0, {}});
       add_to(poses, mavlink::LocalPositionNed{ms, north + (after ? step : 0), 0, 0, speed, 0, 0});
     }
-    return poses;
+    return made;
   };
-  EXPECT_EQ(flown(0, 0, 0).jumps(), 0U);
-  EXPECT_EQ(flown(0, 15, 0).jumps(), 0U);        // fast is no jump
-  EXPECT_EQ(flown(0.1F, 5, 0.05F).jumps(), 0U);  // a correction
-  EXPECT_EQ(flown(1, 5, 0).jumps(), 1U);
-  EXPECT_EQ(flown(-2, 0, 0).jumps(), 1U);
-  EXPECT_EQ(flown(0, 5, 0.5F).jumps(), 1U);  // a heading that was set anew
-  const AutopilotPoses jumped = flown(1, 5, 0);
-  EXPECT_EQ(jumped.at(at_ms(1380)).kind, Kind::never);
-  EXPECT_EQ(jumped.at(at_ms(1500)).kind, Kind::valid);
-  EXPECT_EQ(jumped.at(at_ms(1500)).jumps, 1U);
+  EXPECT_EQ(flown(0, 0, 0)->jumps(), 0U);
+  EXPECT_EQ(flown(0, 15, 0)->jumps(), 0U);        // fast is no jump
+  EXPECT_EQ(flown(0.1F, 5, 0.05F)->jumps(), 0U);  // a correction
+  EXPECT_EQ(flown(1, 5, 0)->jumps(), 1U);
+  EXPECT_EQ(flown(-2, 0, 0)->jumps(), 1U);
+  EXPECT_EQ(flown(0, 5, 0.5F)->jumps(), 1U);  // a heading that was set anew
+  const auto jumped = flown(1, 5, 0);
+  EXPECT_EQ(jumped->at(at_ms(1380)).kind, Kind::never);
+  EXPECT_EQ(jumped->at(at_ms(1500)).kind, Kind::valid);
+  EXPECT_EQ(jumped->at(at_ms(1500)).jumps, 1U);
 }
 
 TEST(AutopilotPoses, AClockThatGoesBackIsAJump) {

@@ -99,11 +99,10 @@ class SensorStream {
   mavlink::Sender sender_{1, 1, 0};
 };
 
-FilteredPoses listening() {
-  FilteredPoses poses = std::move(FilteredPoses::create({})).value();
-  poses.listen_to(kPx4);
-  return poses;
-}
+/// One that listens already.
+struct Listening : FilteredPoses {
+  Listening() : FilteredPoses(navigation::NavigatorOptions{}) { listen_to(kPx4); }
+};
 
 /// How the motion between two poses differs from that between two others.
 struct Difference {
@@ -120,16 +119,16 @@ Difference difference(const Pose& a1, const Pose& a2, const Pose& b1, const Pose
 
 TEST(FilteredPoses, AreThoseOfTheFlight) {
   SensorStream autopilot;
-  FilteredPoses poses = listening();
+  Listening poses;
   autopilot.send(poses, 0, kDuration);
-  EXPECT_EQ(poses.imu_samples(), static_cast<std::size_t>(kDuration * kImuRate));
+  EXPECT_EQ(poses.count(), static_cast<std::size_t>(kDuration * kImuRate));
   EXPECT_EQ(poses.fixes(), static_cast<std::size_t>(kDuration * 5));
   EXPECT_NEAR(poses.imu_rate(), kImuRate, 1);
   EXPECT_EQ(poses.missing(), "");
   EXPECT_EQ(poses.jumps(), 0U);
 
   // Asked as a mapper asks: each frame soon after it was taken.
-  FilteredPoses asked = listening();
+  Listening asked;
   std::vector<double> ways, climbs, turns;
   std::optional<Pose> before, truth_before;
   int within = 0, pairs = 0;
@@ -168,7 +167,7 @@ TEST(FilteredPoses, AreThoseOfTheFlight) {
 /// Whatever rounding and detours through the globe do: a tenth of what the filter errs by.
 TEST(FilteredPoses, AreThoseOfTheMeasurementsThemselves) {
   SensorStream autopilot;
-  FilteredPoses poses = listening();
+  Listening poses;
   navigation::Navigator reference = std::move(navigation::Navigator::create({})).value();
   for (const ImuSample& sample : autopilot.log().imu) {
     reference.add(sample);
@@ -196,7 +195,7 @@ TEST(FilteredPoses, AreThoseOfTheMeasurementsThemselves) {
 
 TEST(FilteredPoses, AreNotYetNeverOrOfAnotherTime) {
   SensorStream autopilot;
-  FilteredPoses poses = listening();
+  Listening poses;
   EXPECT_EQ(poses.at(autopilot.time_of(1)).kind, PoseAnswer::Kind::never);
   EXPECT_EQ(poses.newest(), Time{});
   autopilot.send(poses, 0, 20);
@@ -211,7 +210,7 @@ TEST(FilteredPoses, AreNotYetNeverOrOfAnotherTime) {
 
 TEST(FilteredPoses, TurnClockwiseAsSeenFromAbove) {
   SensorStream autopilot;
-  FilteredPoses poses = listening();
+  Listening poses;
   autopilot.send(poses, 0, 20);
   const auto heading = [&](double t) {
     const auto& truth = autopilot.log().truth[static_cast<std::size_t>(std::lround(t * kImuRate))];
@@ -224,7 +223,7 @@ TEST(FilteredPoses, TurnClockwiseAsSeenFromAbove) {
 
 TEST(FilteredPoses, BeginAnewWhereTheAutopilotDoes) {
   SensorStream before(1000), after(0);
-  FilteredPoses poses = listening();
+  Listening poses;
   before.send(poses, 0, 20);
   EXPECT_EQ(poses.jumps(), 0U);
   after.send(poses, 0, 20);
@@ -241,28 +240,23 @@ TEST(FilteredPoses, BeginAnewWhereTheAutopilotDoes) {
 
 TEST(FilteredPoses, SayWhatIsMissing) {
   SensorStream autopilot;
-  FilteredPoses poses = listening();
+  Listening poses;
   EXPECT_EQ(poses.missing(), "no IMU message");
   for (std::size_t i = 0; i < 60; i += 20) autopilot.give(poses, autopilot.highres(i));
   EXPECT_THAT(poses.missing(), HasSubstr("IMU at 5 Hz, 20 wanted"));
-  FilteredPoses blind = listening();
+  Listening blind;
   autopilot.with_gnss = false;
   autopilot.send(blind, 0, 3);
   EXPECT_EQ(blind.missing(), "no GNSS fix");
-  FilteredPoses unitless = listening();
+  Listening unitless;
   autopilot.give(unitless, mavlink::RawImu{});
   EXPECT_EQ(unitless.missing(), "RAW_IMU has no units");
-  navigation::NavigatorOptions wrong;
-  wrong.history = -1;
-  const auto refused = FilteredPoses::create(wrong);
-  ASSERT_FALSE(refused.ok());
-  EXPECT_THAT(refused.error().message, HasSubstr("history"));
 }
 
 /// What is not stated is said to be assumed, once.
 TEST(FilteredPoses, SayWhatTheyAssume) {
   SensorStream autopilot;
-  FilteredPoses poses = listening();
+  Listening poses;
   autopilot.send(poses, 0, 3);
   ASSERT_EQ(poses.remarks().size(), 1U);
   EXPECT_THAT(poses.remarks().front(), HasSubstr("no vertical velocity"));

@@ -91,7 +91,7 @@ int run(const std::string& flight, int port, const Plan& plan) {
     inputs.image = progress.image;
     inputs.depth = progress.depth;
     inputs.link = link.report();
-    inputs.missing = text_of(inputs.link, PoseMessages::estimate);
+    inputs.missing = text_of(inputs.link);
     return inputs;
   });
   sectors.listener = [&](const auto& distances, Time time) { publisher.take_sectors(distances, time); };

@@ -8,7 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "pade/live/mavlink/estimate_messages.hpp"
+#include "pade/live/link/autopilot_poses.hpp"
+#include "pade/live/link/filtered_poses.hpp"
+#include "pade/live/link/obstacle_points.hpp"
 #include "pade/live/mavlink/sensor_messages.hpp"
 
 namespace pade::live {
@@ -29,11 +31,19 @@ Time later(Time time, double seconds) {
 
 }  // namespace
 
-std::string text_of(const LinkReport& report, PoseMessages poses) {
-  std::string text(text_of(report.missing));
-  if (report.missing != Missing::pose || report.poses_come) return text;
-  if (poses == PoseMessages::odometry) return "no pose: no ODOMETRY in LOCAL_NED";
-  return report.attitudes == 0 ? "no pose: no ATTITUDE" : "no pose: no LOCAL_POSITION_NED";
+std::string text_of(const LinkReport& report) {
+  if (report.missing != Missing::pose || report.poses_missing.empty())
+    return std::string(text_of(report.missing));
+  return fmt::format("no pose: {}", report.poses_missing);
+}
+
+AutopilotLink::AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options,
+                             const navigation::NavigatorOptions& navigator)
+    : port_(std::move(port)), options_(options) {
+  if (options.poses == PoseMessages::sensors)
+    poses_ = std::make_unique<FilteredPoses>(navigator);
+  else
+    poses_ = std::make_unique<AutopilotPoses>(options.poses);
 }
 
 template <class Message>
@@ -79,6 +89,7 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     if (!same)
       report_.autopilot = Autopilot{frame.system, frame.component, heartbeat->autopilot, heartbeat->type};
     heard_ = now;
+    poses_->listen_to(*report_.autopilot);
     port_->answer_sender();
     sender_.system = frame.system;  // PX4 drops what another system sends
     return;
@@ -97,7 +108,7 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
   }
   if (const auto gnss = mavlink::unpack<mavlink::GpsRawInt>(frame))
     report_.gnss = GnssState{gnss->fix_type, gnss->satellites_visible};
-  poses_.add(frame);
+  poses_->add(frame);
 }
 
 void AutopilotLink::take_timesync(const mavlink::Frame& frame, Time now) {
@@ -119,26 +130,25 @@ void AutopilotLink::ask(Time now) {
   }
   if (now < next_request_) return;
   constexpr double kPatience = 2;  // s
-  const auto enough = static_cast<std::size_t>(0.7 * options_.pose_rate * kPatience);
-  const bool come = next_request_.nanoseconds != 0 && poses_.attitudes() - attitudes_asked_at_ >= enough &&
-                    poses_.positions() - positions_asked_at_ >= enough;
-  next_request_ = later(now, kPatience);
-  attitudes_asked_at_ = poses_.attitudes();
-  positions_asked_at_ = poses_.positions();
-  if (come) return;
-  const bool odometry = options_.poses == PoseMessages::odometry;
-  const std::vector<std::uint32_t> messages =
-      odometry ? std::vector{mavlink::Odometry::kId}
-               : std::vector{mavlink::AttitudeQuaternion::kId, mavlink::LocalPositionNed::kId};
-  for (const std::uint32_t id : messages) {
-    mavlink::CommandLong command;
-    command.target_system = report_.autopilot->system;
-    command.target_component = report_.autopilot->component;
-    command.command = kSetMessageInterval;
-    command.param1 = static_cast<float>(id);
-    command.param2 = static_cast<float>(1e6 / options_.pose_rate);  // µs
-    send(command);
+  const std::vector<WantedMessage> wanted = poses_->wanted(options_.pose_rate);
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const auto enough = static_cast<std::size_t>(0.7 * wanted[i].rate * kPatience);
+    const bool come = i < asked_.size() && asked_[i].id == wanted[i].id &&
+                      wanted[i].come - std::min(asked_[i].come, wanted[i].come) >= enough;
+    if (!come) ask_for(wanted[i]);
   }
+  asked_ = wanted;
+  next_request_ = later(now, kPatience);
+}
+
+void AutopilotLink::ask_for(const WantedMessage& message) {
+  mavlink::CommandLong command;
+  command.target_system = report_.autopilot->system;
+  command.target_component = report_.autopilot->component;
+  command.command = kSetMessageInterval;
+  command.param1 = static_cast<float>(message.id);
+  command.param2 = static_cast<float>(1e6 / message.rate);  // µs
+  send(command);
 }
 
 /// The sectors are those of the exposure, the receiver takes them for those of now. Whole bins: between them
@@ -148,17 +158,45 @@ void AutopilotLink::turn_to_newest_heading(mavlink::ObstacleDistance& sectors, T
   if (!theirs || sectors.increment == 0) return;
   constexpr double kDegrees = 180 / std::numbers::pi;
   const auto bins =
-      static_cast<std::ptrdiff_t>(std::lround(kDegrees * poses_.turned_since(*theirs) / sectors.increment));
+      static_cast<std::ptrdiff_t>(std::lround(kDegrees * poses_->turned_since(*theirs) / sectors.increment));
   const auto count = static_cast<std::ptrdiff_t>(sectors.distances.size());
   std::rotate(sectors.distances.begin(), sectors.distances.begin() + ((bins % count) + count) % count,
               sectors.distances.end());
 }
 
+bool AutopilotLink::send_level() {
+  turn_to_newest_heading(offered_->level, offered_frame_);
+  return send(offered_->level);
+}
+
+/// As seen from where the vehicle is by now.
+bool AutopilotLink::send_points() {
+  const auto theirs = clock_.to_autopilot(offered_frame_);
+  if (!theirs) return false;
+  const PoseAnswer then = poses_->at(*theirs);
+  const PoseAnswer now = poses_->at(poses_->newest());
+  if (then.kind == PoseAnswer::Kind::valid && now.kind == PoseAnswer::Kind::valid &&
+      then.jumps == now.jumps) {
+    const Pose T_now_then = now.T_world_body.inverse() * then.T_world_body;
+    for (Eigen::Vector3d& point : offered_->points) point = T_now_then * point;
+  }
+  // Each frame has two stamps of its own.
+  auto stamp = static_cast<std::uint32_t>(theirs->nanoseconds / 1'000'000);
+  if (stamp - last_stamp_ < 2 || last_stamp_ - stamp < 2) stamp = last_stamp_ + 2;
+  last_stamp_ = stamp;
+  bool sent = true;
+  for (const auto& message : obstacle_messages(offered_->points, stamp, offered_->options))
+    sent = send(message) && sent;
+  return sent;
+}
+
 void AutopilotLink::send_sectors(Time now) {
   if (!offered_) return;
+  const bool in_faces = options_.obstacles == ObstacleMessages::faces;
+  report_.level_instead = in_faces && report_.autopilot->kind != ardupilot_kind;
   if (seconds_between(offered_frame_, now) > kOldest) {
     ++report_.sectors_stale;
-  } else if (turn_to_newest_heading(*offered_, offered_frame_); send(*offered_)) {
+  } else if (in_faces && !report_.level_instead ? send_points() : send_level()) {
     ++report_.sectors_sent;
     progress_.sent = offered_frame_.nanoseconds;
   }
@@ -169,15 +207,16 @@ void AutopilotLink::send_sectors(Time now) {
 /// pilot can take.
 void AutopilotLink::send_health(Time now, const Progress& progress) {
   constexpr double kBetweenHeartbeats = 0.1, kBetweenTexts = 1;  // s
-  const auto newest = clock_.to_ours(poses_.newest());
-  const bool any = poses_.newest().nanoseconds != 0 && newest.has_value();
+  const auto newest = clock_.to_ours(poses_->newest());
+  const bool any = poses_->newest().nanoseconds != 0 && newest.has_value();
   progress_.synchronised = clock_.synchronised(now);
   progress_.pose = any ? newest->nanoseconds : 0;
   const Missing missing = missing_now(now, progress, progress_);
   const bool changed = missing != report_.missing;
   report_.missing = missing;
+  report_.poses_missing = missing == Missing::pose ? poses_->missing() : std::string();
   if (said_ != missing && now >= next_text_) {
-    say(missing == Missing::nothing ? kInformation : kWarning, text_of(report_, options_.poses));
+    say(missing == Missing::nothing ? kInformation : kWarning, text_of(report_));
     said_ = missing;
     next_text_ = later(now, kBetweenTexts);
   }
@@ -207,29 +246,39 @@ void AutopilotLink::end() {
 PoseAnswer AutopilotLink::pose_at(Time time) const {
   const std::lock_guard lock(mutex_);
   const auto theirs = clock_.to_autopilot(time);
-  return theirs ? poses_.at(*theirs) : PoseAnswer{};
+  return theirs ? poses_->at(*theirs) : PoseAnswer{};
 }
 
-void AutopilotLink::offer(const std::optional<mavlink::ObstacleDistance>& sectors, Time frame) {
+std::optional<Matrix6d> AutopilotLink::motion_covariance(Time t1, Time t2, const Pose& T_body_camera) const {
   const std::lock_guard lock(mutex_);
-  offered_ = sectors;
+  const auto theirs1 = clock_.to_autopilot(t1);
+  const auto theirs2 = clock_.to_autopilot(t2);
+  if (!theirs1 || !theirs2) return std::nullopt;
+  return poses_->motion_covariance(*theirs1, *theirs2, T_body_camera);
+}
+
+void AutopilotLink::offer(const std::optional<FrameObstacles>& obstacles, Time frame) {
+  const std::lock_guard lock(mutex_);
+  offered_ = obstacles;
   offered_frame_ = frame;
-  (sectors ? progress_.offered : progress_.empty) = frame.nanoseconds;
+  (obstacles ? progress_.offered : progress_.empty) = frame.nanoseconds;
 }
 
 void AutopilotLink::refresh_report(Time now) {
   report_.synchronised = clock_.synchronised(now);
   report_.clock_bound = clock_.bound();
   report_.clock_restarts = clock_.restarts();
-  report_.attitudes = poses_.attitudes();
-  report_.positions = poses_.positions();
-  report_.jumps = poses_.jumps();
-  report_.poses_come = poses_.newest().nanoseconds != 0;
+  report_.poses = poses_->count();
+  report_.jumps = poses_->jumps();
+  report_.poses_come = poses_->newest().nanoseconds != 0;
 }
 
 LinkReport AutopilotLink::report() const {
   const std::lock_guard lock(mutex_);
-  return report_;
+  LinkReport report = report_;
+  report.poses_missing = poses_->missing();
+  report.poses_summary = poses_->summary();
+  return report;
 }
 
 }  // namespace pade::live

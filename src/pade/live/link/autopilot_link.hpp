@@ -1,6 +1,7 @@
 // The talk with the autopilot: its poses and clock in, sectors and health out.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -8,35 +9,51 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "pade/core/options.hpp"
 #include "pade/live/autopilot_sensors.hpp"
 #include "pade/live/interfaces.hpp"
-#include "pade/live/link/autopilot_poses.hpp"
 #include "pade/live/link/health.hpp"
 #include "pade/live/link/port.hpp"
+#include "pade/live/link/pose_source.hpp"
 #include "pade/live/link_clock.hpp"
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/link_messages.hpp"
 #include "pade/live/mavlink/parser.hpp"
+#include "pade/live/sectors.hpp"
+#include "pade/navigation/navigator.hpp"
 
 namespace pade::live {
 
+/// How obstacles are told.
+enum class ObstacleMessages : std::uint8_t {
+  level,  ///< OBSTACLE_DISTANCE: distances around the vehicle
+  faces,  ///< OBSTACLE_DISTANCE_3D: points in three dimensions; others than ArduPilot get OBSTACLE_DISTANCE
+};
+
 /// Options of AutopilotLink.
 struct LinkOptions {
-  std::string port = "udp:14540";               ///< udp:PORT, or a serial device
-  int baud = 921600;                            ///< of a serial device
-  PoseMessages poses = PoseMessages::estimate;  ///< where poses come from
-  double pose_rate = 30;                        ///< Hz that the autopilot is asked for
+  std::string port = "udp:14540";                        ///< udp:PORT, or a serial device
+  int baud = 921600;                                     ///< of a serial device
+  PoseMessages poses = PoseMessages::estimate;           ///< where poses come from
+  double pose_rate = 30;                                 ///< Hz that the autopilot is asked for
+  ObstacleMessages obstacles = ObstacleMessages::level;  ///< what is sent
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
     field("port", self.port, "udp:PORT, or a serial device such as /dev/ttyAMA0");
     field("baud", self.baud, "of a serial device");
-    field("poses", self.poses,
-          "estimate: ATTITUDE_QUATERNION (else ATTITUDE) and LOCAL_POSITION_NED; odometry: ODOMETRY");
+    field(
+        "poses", self.poses,
+        "estimate: ATTITUDE_QUATERNION (else ATTITUDE) and LOCAL_POSITION_NED; odometry: ODOMETRY; sensors: "
+        "IMU, GNSS, magnetometer and barometer in our own filter");
     field("pose_rate", self.pose_rate, "Hz that the autopilot is asked for");
+    field("obstacles", self.obstacles,
+          "level: OBSTACLE_DISTANCE; faces: OBSTACLE_DISTANCE_3D, which ArduPilot alone knows");
   }
 };
 
@@ -53,27 +70,36 @@ struct LinkReport {
   bool synchronised = false;           ///< with its clock
   double clock_bound = 0;              ///< of the clock's error, s
   std::size_t clock_restarts = 0;
-  std::size_t attitudes = 0;
-  std::size_t positions = 0;
-  std::size_t jumps = 0;          ///< of its estimate
+  std::size_t poses = 0;          ///< that have come (PoseSource::count)
+  std::string poses_missing;      ///< why there are none; empty if there are
+  std::string poses_summary;      ///< what has come for them
+  std::size_t jumps = 0;          ///< of the poses
   std::optional<GnssState> gnss;  ///< empty: GPS_RAW_INT has not come
-  bool poses_come = false;        ///< attitudes and positions, so that there are poses between them
-  std::size_t sectors_sent = 0;
+  bool poses_come = false;        ///< so that there are poses
+  std::size_t sectors_sent = 0;   ///< frames whose obstacles were sent
+  bool level_instead = false;     ///< of OBSTACLE_DISTANCE_3D, which this autopilot does not know
   std::size_t sectors_stale = 0;  ///< too old when their turn came, so not sent
   std::size_t unsent = 0;         ///< packets that the port did not take
   std::string refused;            ///< the last request that the autopilot refused; empty if none
   Missing missing = Missing::autopilot;
 };
 
-/// For the pilot: what is missing, and of poses which message; at most the 44 characters that a STATUSTEXT
-/// has left.
-std::string text_of(const LinkReport& report, PoseMessages poses);
+/// For the pilot: what is missing, and of poses why; at most the 44 characters that a STATUSTEXT has left.
+std::string text_of(const LinkReport& report);
+
+/// The obstacles of a frame.
+struct FrameObstacles {
+  mavlink::ObstacleDistance level;
+  std::vector<Eigen::Vector3d> points;  ///< obstacle_points(), if they are to be sent as such
+  SectorOptions options;                ///< their limits
+};
 
 /// One for each autopilot. step() belongs to one thread, all else to any.
 class AutopilotLink : public NavigationSource {
  public:
-  AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options)
-      : port_(std::move(port)), options_(options), poses_(options.poses) {}
+  /// @param navigator  of our own filter; both options such as check() accepts
+  AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options,
+                const navigation::NavigatorOptions& navigator = {});
 
   /// Waits for bytes, at most so long, ms.
   void wait(int milliseconds) { port_->wait(milliseconds); }
@@ -81,10 +107,12 @@ class AutopilotLink : public NavigationSource {
   void step(Time now, const Progress& progress);
 
   [[nodiscard]] PoseAnswer pose_at(Time time) const override;
-  /// Sectors of a frame, sent at the next step unless they are older than 0.3 s by then; those before them
+  [[nodiscard]] std::optional<Matrix6d> motion_covariance(Time t1, Time t2,
+                                                          const Pose& T_body_camera) const override;
+  /// Obstacles of a frame, sent at the next step unless they are older than 0.3 s by then; those before them
   /// that were not sent are forgotten. None: nothing could be said of any sector, and nothing is sent, since
   /// receivers would take it for a sign of health.
-  void offer(const std::optional<mavlink::ObstacleDistance>& sectors, Time frame);
+  void offer(const std::optional<FrameObstacles>& obstacles, Time frame);
   /// Says that there will be no more sectors. To be called when nobody calls step() any more.
   void end();
   [[nodiscard]] LinkReport report() const;
@@ -94,6 +122,9 @@ class AutopilotLink : public NavigationSource {
   void take_timesync(const mavlink::Frame& frame, Time now);
   void ask(Time now);
   void send_sectors(Time now);
+  void ask_for(const WantedMessage& message);
+  bool send_level();
+  bool send_points();
   void turn_to_newest_heading(mavlink::ObstacleDistance& sectors, Time frame) const;
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);
@@ -107,18 +138,25 @@ class AutopilotLink : public NavigationSource {
   mavlink::Parser parser_;
   mavlink::Sender sender_;
   Time next_question_, next_request_, next_heartbeat_, next_text_, earliest_heartbeat_;
-  Time heard_;                          // the autopilot's heartbeat, last
-  std::optional<Missing> said_;         // in the last text
-  std::size_t attitudes_asked_at_ = 0;  // how many had come when the streams were last asked for
-  std::size_t positions_asked_at_ = 0;
+  Time heard_;                        // the autopilot's heartbeat, last
+  std::optional<Missing> said_;       // in the last text
+  std::vector<WantedMessage> asked_;  // how many had come when the streams were last asked for
+  std::uint32_t last_stamp_ = 0;      // of points, ms
 
   mutable std::mutex mutex_;  // of all below
-  AutopilotPoses poses_;
+  std::unique_ptr<PoseSource> poses_;
   LinkClock clock_;
   LinkReport report_;
-  std::optional<mavlink::ObstacleDistance> offered_;
+  std::optional<FrameObstacles> offered_;
   Time offered_frame_;
   LinkProgress progress_;
 };
 
 }  // namespace pade::live
+
+template <>
+struct pade::EnumNames<pade::live::ObstacleMessages> {
+  static constexpr std::array names = {
+      std::pair{pade::live::ObstacleMessages::level, std::string_view("level")},
+      std::pair{pade::live::ObstacleMessages::faces, std::string_view("faces")}};
+};

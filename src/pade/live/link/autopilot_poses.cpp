@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include <fmt/format.h>
+
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
 
@@ -140,7 +142,7 @@ void AutopilotPoses::add(const mavlink::Frame& frame) {
   }
 }
 
-PoseAnswer AutopilotPoses::at(Time time) const {
+PoseAnswer AutopilotPoses::at(Time time) {
   const Bracket turn = bracket(attitudes_, time);
   const Bracket place = bracket(positions_, time);
   using Kind = PoseAnswer::Kind;
@@ -157,7 +159,7 @@ PoseAnswer AutopilotPoses::at(Time time) const {
   return answer;
 }
 
-double AutopilotPoses::turned_since(Time time) const {
+double AutopilotPoses::turned_since(Time time) {
   const Bracket then = bracket(attitudes_, time);
   if (then.kind != PoseAnswer::Kind::valid) return 0;
   const auto heading = [](const Quaterniond& rotation) {
@@ -168,9 +170,26 @@ double AutopilotPoses::turned_since(Time time) const {
                         2 * std::numbers::pi);
 }
 
-Time AutopilotPoses::newest() const {
+Time AutopilotPoses::newest() {
   if (attitudes_.empty() || positions_.empty()) return {};
   return std::min(attitudes_.back().time, positions_.back().time);
+}
+
+std::vector<WantedMessage> AutopilotPoses::wanted(double pose_rate) const {
+  if (messages_ == PoseMessages::odometry)
+    return {{mavlink::Odometry::kId, pose_rate, std::min(attitudes_come_, positions_come_)}};
+  return {{mavlink::AttitudeQuaternion::kId, pose_rate, attitudes_come_},
+          {mavlink::LocalPositionNed::kId, pose_rate, positions_come_}};
+}
+
+std::string AutopilotPoses::missing() {
+  if (newest().nanoseconds != 0) return {};
+  if (messages_ == PoseMessages::odometry) return "no ODOMETRY in LOCAL_NED";
+  return attitudes_come_ == 0 ? "no ATTITUDE" : "no LOCAL_POSITION_NED";
+}
+
+std::string AutopilotPoses::summary() {
+  return fmt::format("{} attitudes, {} positions", attitudes_come_, positions_come_);
 }
 
 }  // namespace pade::live

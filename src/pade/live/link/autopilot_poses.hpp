@@ -1,60 +1,45 @@
 // Poses from the autopilot's own estimate, at any time between its messages.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <string_view>
-#include <utility>
+#include <string>
+#include <vector>
 
-#include "pade/core/options.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/time.hpp"
+#include "pade/live/link/pose_source.hpp"
 #include "pade/live/mavlink/frame.hpp"
 
 namespace pade::live {
 
-/// Which of its messages say where the vehicle is.
-enum class PoseMessages : std::uint8_t {
-  estimate,  ///< ATTITUDE_QUATERNION (else ATTITUDE) and LOCAL_POSITION_NED
-  odometry,  ///< ODOMETRY in the frame LOCAL_NED
-};
-
-/// A pose, or why there is none.
-struct PoseAnswer {
-  enum class Kind : std::uint8_t {
-    valid,    ///< there is one
-    not_yet,  ///< the messages that it lies between have not come
-    never,    ///< they will not come any more
-  };
-  Kind kind = Kind::not_yet;
-  Pose T_world_body;      ///< ENU of the autopilot's origin, body FLU; if valid
-  std::string_view why;   ///< if never
-  std::size_t jumps = 0;  ///< how often poses have jumped: what is before and after does not belong together
-};
-
 /// Keeps the last seconds of it. All times are the autopilot's, since its start.
-class AutopilotPoses {
+class AutopilotPoses : public PoseSource {
  public:
   explicit AutopilotPoses(PoseMessages messages) : messages_(messages) {}
 
   /// A message of the autopilot; others than those of poses change nothing.
-  void add(const mavlink::Frame& frame);
+  void add(const mavlink::Frame& frame) override;
   /// Between two messages: rotation and position each on their straight way from the one before to the one
   /// after. No pose is extrapolated, and none comes from messages more than 0.25 s apart.
-  [[nodiscard]] PoseAnswer at(Time time) const;
+  [[nodiscard]] PoseAnswer at(Time time) override;
   /// How often the estimate has jumped: as it says itself (reset counter of ODOMETRY), since its clock was
   /// set back, or because a step or turn is not what its own velocity and rates say. Poses before are
   /// forgotten.
-  [[nodiscard]] std::size_t jumps() const { return jumps_; }
+  [[nodiscard]] std::size_t jumps() const override { return jumps_; }
+  [[nodiscard]] std::size_t count() const override { return std::min(attitudes_come_, positions_come_); }
   [[nodiscard]] std::size_t attitudes() const { return attitudes_come_; }  ///< that came
   [[nodiscard]] std::size_t positions() const { return positions_come_; }  ///< that came
   /// How far the body has turned from a time to the newest attitude, clockwise seen from above, rad; 0 where
   /// that is not known.
-  [[nodiscard]] double turned_since(Time time) const;
+  [[nodiscard]] double turned_since(Time time) override;
   /// Of the newest pose that can be answered; the start of time if there is none.
-  [[nodiscard]] Time newest() const;
+  [[nodiscard]] Time newest() override;
+  [[nodiscard]] std::vector<WantedMessage> wanted(double pose_rate) const override;
+  [[nodiscard]] std::string missing() override;
+  [[nodiscard]] std::string summary() override;
 
  private:
   template <class Value>
@@ -85,10 +70,3 @@ class AutopilotPoses {
 };
 
 }  // namespace pade::live
-
-template <>
-struct pade::EnumNames<pade::live::PoseMessages> {
-  static constexpr std::array names = {
-      std::pair{pade::live::PoseMessages::estimate, std::string_view("estimate")},
-      std::pair{pade::live::PoseMessages::odometry, std::string_view("odometry")}};
-};

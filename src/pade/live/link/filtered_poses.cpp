@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "pade/live/mavlink/sensor_messages.hpp"
+
 namespace pade::live {
 namespace {
 
@@ -19,12 +21,6 @@ double heading_of(const Pose& T_world_body) {
 }
 
 }  // namespace
-
-Result<FilteredPoses> FilteredPoses::create(const navigation::NavigatorOptions& options) {
-  auto navigator = navigation::Navigator::create(options);
-  if (!navigator) return navigator.error();
-  return FilteredPoses(options, std::move(navigator).value());
-}
 
 void FilteredPoses::listen_to(const Autopilot& autopilot) {
   const bool same = autopilot_ && autopilot_->system == autopilot.system &&
@@ -69,6 +65,7 @@ void FilteredPoses::add(const mavlink::Frame& frame) {
   }
   for (const MagneticField& field : samples.fields) navigator_.add(field);
   for (const BarometricHeight& height : samples.heights) navigator_.add(height);
+  heights_ += samples.heights.size();
   if (!samples.fixes.empty()) add_fixes(std::move(samples.fixes));
   if (const std::uint64_t restarts = navigator_.health().restarts; restarts != restarts_) {
     restarts_ = restarts;
@@ -94,6 +91,11 @@ PoseAnswer FilteredPoses::at(Time time) {
   PoseAnswer answer;
   answer.jumps = jumps_;
   const navigation::AbsolutePose pose = navigator_.absolute_pose(time);
+  if (navigator_.health().status == NavigationStatus::lost) {
+    answer.kind = PoseAnswer::Kind::never;
+    answer.why = "the filter is lost";
+    return answer;
+  }
   switch (pose.answer) {
     case Answer::valid:
       answer.kind = PoseAnswer::Kind::valid;
@@ -152,6 +154,23 @@ std::string FilteredPoses::missing() {
     default:
       return {};
   }
+}
+
+std::vector<WantedMessage> FilteredPoses::wanted(double /*pose_rate*/) const {
+  constexpr double kImuRate = 100;  // Hz
+  constexpr double kSlowRate = 5;
+  const WantedMessage fixes{mavlink::GpsRawInt::kId, kSlowRate, fixes_};
+  // ArduPilot has no HIGHRES_IMU that every version sends; others leave RAW_IMU without a unit.
+  if (autopilot_ && autopilot_->kind == ardupilot_kind)
+    return {{mavlink::RawImu::kId, kImuRate, imu_samples_},
+            {mavlink::ScaledPressure::kId, kSlowRate, heights_},
+            fixes};
+  return {{mavlink::HighresImu::kId, kImuRate, imu_samples_}, fixes};
+}
+
+std::string FilteredPoses::summary() {
+  return fmt::format("{} samples of the IMU at {:.0f} Hz, {} fixes, {} heights; {}", imu_samples_, imu_rate(),
+                     fixes_, heights_, to_name(navigator_.health().status));
 }
 
 }  // namespace pade::live

@@ -8,10 +8,9 @@
 #include <vector>
 
 #include "pade/core/pose.hpp"
-#include "pade/core/result.hpp"
 #include "pade/core/time.hpp"
 #include "pade/live/autopilot_sensors.hpp"
-#include "pade/live/link/autopilot_poses.hpp"
+#include "pade/live/link/pose_source.hpp"
 #include "pade/navigation/navigator.hpp"
 
 namespace pade::live {
@@ -19,41 +18,39 @@ namespace pade::live {
 /// The GPS/INS filter on IMU, GNSS, magnetometer and barometer of an autopilot's messages (SensorGatherer
 /// says which). The world is east, north, up of the first fix. All times are the autopilot's, since its
 /// start.
-class FilteredPoses {
+class FilteredPoses : public PoseSource {
  public:
-  /// Errors: options that make no sense; the message names them.
-  static Result<FilteredPoses> create(const navigation::NavigatorOptions& options);
+  /// @param options  that check() accepts
+  explicit FilteredPoses(const navigation::NavigatorOptions& options)
+      : options_(options), navigator_(options) {}
 
   /// Whose messages are to come. Another one than before begins anew.
-  void listen_to(const Autopilot& autopilot);
+  void listen_to(const Autopilot& autopilot) override;
   /// A message of the autopilot. Where its clock goes back by more than a second, or the filter starts anew,
   /// all begins anew and counts as a jump.
-  void add(const mavlink::Frame& frame);
+  void add(const mavlink::Frame& frame) override;
 
   /// By the filter's smooth pose, which no correction makes jump.
-  [[nodiscard]] PoseAnswer at(Time time);
-  /// Covariance of the camera's motion between two times, as Frame::motion_covariance has it. Empty where the
-  /// filter knows no motion between them.
-  [[nodiscard]] std::optional<Matrix6d> motion_covariance(Time t1, Time t2, const Pose& T_body_camera);
-  [[nodiscard]] std::size_t jumps() const { return jumps_; }
-  /// Of the newest pose that can be answered; the start of time if there is none.
-  [[nodiscard]] Time newest();
-  /// How far the body has turned since a time, clockwise seen from above, rad; 0 where that is not known.
-  [[nodiscard]] double turned_since(Time time);
-  [[nodiscard]] std::size_t imu_samples() const { return imu_samples_; }
+  [[nodiscard]] PoseAnswer at(Time time) override;
+  [[nodiscard]] std::optional<Matrix6d> motion_covariance(Time t1, Time t2,
+                                                          const Pose& T_body_camera) override;
+  [[nodiscard]] std::size_t jumps() const override { return jumps_; }
+  [[nodiscard]] Time newest() override;
+  [[nodiscard]] double turned_since(Time time) override;
+  [[nodiscard]] std::vector<WantedMessage> wanted(double pose_rate) const override;
+  [[nodiscard]] std::size_t count() const override { return imu_samples_; }
   [[nodiscard]] std::size_t fixes() const { return fixes_; }
   /// By the last two seconds, Hz.
   [[nodiscard]] double imu_rate() const;
-  /// What is wanting for a pose: "no IMU message", "IMU at 4 Hz, 20 wanted", "no GNSS fix", "the filter is
-  /// starting", "the filter is lost"; empty if nothing is.
-  [[nodiscard]] std::string missing();
+  /// "no IMU message", "IMU at 4 Hz, 20 wanted", "no GNSS fix", "the filter is starting", "the filter is
+  /// lost".
+  [[nodiscard]] std::string missing() override;
+  [[nodiscard]] std::string summary() override;
   [[nodiscard]] navigation::Health health() { return navigator_.health(); }
   /// What had to be assumed of the sensors, one sentence each.
   [[nodiscard]] const std::vector<std::string>& remarks() const { return remarks_; }
 
  private:
-  FilteredPoses(const navigation::NavigatorOptions& options, navigation::Navigator navigator)
-      : options_(options), navigator_(std::move(navigator)) {}
   void begin_anew();
   void add_fixes(std::vector<io::GeodeticFix> fixes);
 
@@ -66,6 +63,7 @@ class FilteredPoses {
   std::vector<std::string> remarks_;
   std::size_t imu_samples_ = 0;
   std::size_t fixes_ = 0;
+  std::size_t heights_ = 0;
   std::size_t jumps_ = 0;
   std::uint64_t restarts_ = 0;  // of the filter, that have counted as jumps
 };

@@ -67,12 +67,8 @@ std::string satellites_of(const std::optional<GnssState>& gnss) {
 
 io::Diagnosis SessionHealth::of(const HealthInputs& inputs) {
   constexpr double kWindow = 3;  // s
-  const Past now{inputs.now,
-                 inputs.counts.frames,
-                 inputs.counts.mapped,
-                 inputs.link.sectors_sent,
-                 std::min(inputs.link.attitudes, inputs.link.positions),
-                 processor_seconds()};
+  const Past now{inputs.now,        inputs.counts.frames, inputs.counts.mapped, inputs.link.sectors_sent,
+                 inputs.link.poses, processor_seconds()};
   past_.push_back(now);
   while (past_.size() > 2 && seconds_between(past_[1].time, now.time) > kWindow) past_.pop_front();
   const Past& then = past_.front();
