@@ -173,8 +173,10 @@ std::set<Voxel> occupied_of(const mapping::MapView& view) {
 /// What a client draws.
 struct Drawn {
   std::map<int, std::set<Voxel>> blocks;
+  int removed = 0;
   void take(const std::vector<io::CubeMarker>& markers) {
     for (const io::CubeMarker& marker : markers) {
+      removed += marker.action == io::CubeMarker::Action::remove ? 1 : 0;
       if (marker.action == io::CubeMarker::Action::remove_all) {
         blocks.clear();
         continue;
@@ -207,19 +209,23 @@ TEST(VoxelLog, WhoeverFollowsItDrawsTheMap) {
   const auto catch_up = [&](std::size_t i, std::size_t most) {
     while (known[i] != log.newest()) drawn[i].take(log.since(known[i], most));
   };
-  for (int frame = 0; frame < 60; ++frame) {
-    if (frame == 40) {
+  for (int frame = 0; frame < 80; ++frame) {
+    if (frame == 60) {
       world.begin_anew(ignore);
       touched.clear();
       log.begin_anew();
     }
-    // Walls that come and go: behind what was a wall is free space later.
-    world.give(ignore, 1.5 + 0.1 * static_cast<double>(random() % 30), {0.05 * frame, 0, 0});
+    // A wall that goes, then others that come and go.
+    const double any = 1.5 + 0.1 * static_cast<double>(random() % 30);
+    world.give(ignore, frame < 10 ? 2 : frame < 40 ? 4.5 : any, {0.005 * frame, 0, 0});
     add_touched(world.mapped().change, touched);
     if (frame % 3 != 0) continue;
     log.update(world.view(), std::exchange(touched, {}));
     if (frame % 2 == 0) drawn[0].take(log.since(known[0], 50));  // never quite there
-    if (frame % 9 == 0) catch_up(1, 300);
+    if (frame % 9 == 0) {
+      catch_up(1, 300);
+      EXPECT_EQ(drawn[1].all(), occupied_of(*world.view())) << frame;
+    }
   }
   log.update(world.view(), touched);
   const std::set<Voxel> truth = occupied_of(*world.view());
@@ -229,6 +235,32 @@ TEST(VoxelLog, WhoeverFollowsItDrawsTheMap) {
     catch_up(i, 200);
     EXPECT_EQ(drawn[i].all(), truth) << i;
   }
+}
+
+TEST(VoxelLog, ABlockThatIsEmptyAgainIsTakenAway) {
+  struct Ignore : Sink {
+    void take(const LiveUpdate& /*update*/) override {}
+  } ignore;
+  SmallWorld wall, empty;
+  wall.give(ignore, 3, {0, 0, 0});
+  TouchedBlocks touched;
+  add_touched(wall.mapped().change, touched);
+  VoxelLog log;
+  log.update(wall.view(), touched);
+  Drawn drawn;
+  std::uint64_t known = 0;
+  drawn.take(log.since(known, 1'000'000));
+  EXPECT_EQ(drawn.all(), occupied_of(*wall.view()));
+  EXPECT_FALSE(drawn.all().empty());
+  log.update(mapping::MapView::of(empty.map()), touched);
+  drawn.take(log.since(known, 1'000'000));
+  EXPECT_GT(drawn.removed, 0);
+  EXPECT_TRUE(drawn.all().empty());
+  EXPECT_EQ(log.occupied(), 0U);
+  // Whoever comes now need not hear of it.
+  std::uint64_t late = 0;
+  EXPECT_EQ(log.since(late, 1'000'000).size(), 1U);
+  EXPECT_EQ(late, log.newest());
 }
 
 TEST(VoxelLog, WhatStaysTheSameIsNotSentAgain) {

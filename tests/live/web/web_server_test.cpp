@@ -241,6 +241,11 @@ TEST_F(WebServerTest, FrozenClientsCostNoMemoryAndGetTheNewestWhenTheyThaw) {
     world_->give(*publisher_, 5, {0.1, 0, 0});
   }
   EXPECT_EQ(seen, 5.0F);
+  // What was passed over stays counted when they leave.
+  const std::size_t dropped = server_->counts().dropped;
+  clients.clear();
+  EXPECT_TRUE(comes_true([&] { return server_->counts().clients == 0; }));
+  EXPECT_GE(server_->counts().dropped, dropped);
 }
 
 TEST_F(WebServerTest, ClosesClientsThatSendTooMuchOrNonsense) {

@@ -68,6 +68,7 @@ std::unique_ptr<RawClient> frozen_client(int port) {
 
 struct Plan {
   double seconds = 20;
+  int views = 4;     // of the mapper; 0: it is faster
   double phase = 0;  // s of each turn without and with frozen clients; 0: none
   int clients = 1;   // that are frozen
   double rate = 10;  // Hz
@@ -100,8 +101,10 @@ int run(const std::string& flight, int port, const Plan& plan) {
   auto server = WebServer::start(web, publisher);
   if (!server) return fmt::print(stderr, "{}\n", server.error().message), 1;
   Stopwatch watch;
+  ObstacleMapperOptions mapper;
+  mapper.views.count = plan.views;
   auto session =
-      Session::create({camera, link, {&sectors, &publisher, &watch}, progress, mounting, &watch}, {}, {});
+      Session::create({camera, link, {&sectors, &publisher, &watch}, progress, mounting, &watch}, {}, mapper);
   if (!session) return fmt::print(stderr, "{}\n", session.error().message), 1;
   const UdpAutopilot autopilot(camera.start(), kLinkPort, [&](Time time) {
     return camera_pose(camera.pose_at(time), mounting.inverse());
@@ -116,7 +119,6 @@ int run(const std::string& flight, int port, const Plan& plan) {
   fmt::print("{}\n", (*server)->url());
   (void)std::fflush(stdout);
   std::vector<std::unique_ptr<RawClient>> frozen;
-  std::map<std::string, double> memory;
   const Time start = now_of_ours();
   session->run([&] {
     const double elapsed = seconds_between(start, now_of_ours());
@@ -124,11 +126,12 @@ int run(const std::string& flight, int port, const Plan& plan) {
     publisher.take_counts(session->counts());
     if (plan.phase > 0) {
       const bool cold = static_cast<int>(elapsed / plan.phase) % 2 == 1;
+      if (cold != !frozen.empty())
+        fmt::print("{:.0f} s, clients {}: {:.1f} MB\n", elapsed, watch.phase, resident_megabytes());
       if (cold && frozen.empty())
         for (int i = 0; i < plan.clients; ++i) frozen.push_back(frozen_client((*server)->port()));
       if (!cold) frozen.clear();
       watch.phase = elapsed < 5 ? "start" : cold ? "frozen" : "none";
-      memory[watch.phase] = std::max(memory[watch.phase], resident_megabytes());
     }
     return elapsed > plan.seconds;
   });
@@ -139,9 +142,8 @@ int run(const std::string& flight, int port, const Plan& plan) {
              counts.mapped, counts.skipped, counts.dropped, (*server)->counts().dropped);
   for (auto& [phase, times] : watch.times) {
     std::sort(times.begin(), times.end());
-    fmt::print(
-        "clients {}: {} frames, frame time median {:.2f} ms, 95 % {:.2f} ms, memory at most {:.1f} MB\n",
-        phase, times.size(), times[times.size() / 2], times[times.size() * 95 / 100], memory[phase]);
+    fmt::print("clients {}: {} frames, frame time median {:.2f} ms, 95 % {:.2f} ms\n", phase, times.size(),
+               times[times.size() / 2], times[times.size() * 95 / 100]);
   }
   return 0;
 }
@@ -149,7 +151,7 @@ int run(const std::string& flight, int port, const Plan& plan) {
 }  // namespace
 }  // namespace pade::live
 
-/// FLIGHT PORT [SECONDS [RATE [PHASE [CLIENTS]]]]; from SIGUSR1 on the camera stands still.
+/// FLIGHT PORT [SECONDS [RATE [PHASE [CLIENTS [VIEWS]]]]]; SIGUSR1: the camera stands still, or goes on.
 int main(int count, char** arguments) {
   if (count < 3) return 2;
   pade::live::Plan plan;
@@ -160,6 +162,7 @@ int main(int count, char** arguments) {
   plan.rate = number(4, plan.rate);
   plan.phase = number(5, plan.phase);
   plan.clients = static_cast<int>(number(6, plan.clients));
-  (void)std::signal(SIGUSR1, [](int) { pade::live::stall_asked = 1; });
+  plan.views = static_cast<int>(number(7, plan.views));
+  (void)std::signal(SIGUSR1, [](int) { pade::live::stall_asked = 1 - pade::live::stall_asked; });
   return pade::live::run(arguments[1], std::atoi(arguments[2]), plan);
 }

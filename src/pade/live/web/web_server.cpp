@@ -103,16 +103,17 @@ class WebServer::Work {
   void tick();
   void ask_all();
   int answer_request(lws* socket, Connection& connection, std::string_view path);
-  int answer(lws* socket, Connection& connection, int code, const char* type, std::string_view body);
+  static int answer(lws* socket, Connection& connection, int code, const char* type, std::string_view body);
   int send_body(lws* socket, Connection& connection);
   int refuse(lws* socket, const Refusal& refusal);
   void refused(const std::string& reason);
   int open(lws* socket, Connection& connection);
   void close(Connection& connection);
   int receive(WebClient& client, std::string_view part, bool last);
-  void obey(WebClient& client, const ClientRequest& request);
+  static void obey(WebClient& client, const ClientRequest& request);
   int write(WebClient& client);
   bool take_next(WebClient& client);
+  [[nodiscard]] std::size_t dropped_of(const WebClient& client) const;
   void look_around();
 
   struct Beat {
@@ -205,11 +206,7 @@ void WebServer::Work::beat() {
 /// Counts and health, a few times a second.
 void WebServer::Work::tick() {
   std::size_t dropped = dropped_by_gone_;
-  for (const WebClient& client : clients_) {
-    dropped += client.cursor.dropped;
-    for (std::size_t i = 0; i < kWebChannels; ++i)
-      if (client.subscriptions[i]) dropped += publisher_.missed(static_cast<WebChannel>(i), client.cursor);
-  }
+  for (const WebClient& client : clients_) dropped += dropped_of(client);
   WebCounts counts;
   {
     const std::lock_guard lock(mutex_);
@@ -219,6 +216,13 @@ void WebServer::Work::tick() {
   }
   publisher_.refresh(counts, !clients_.empty());
   ask_all();
+}
+
+std::size_t WebServer::Work::dropped_of(const WebClient& client) const {
+  std::size_t dropped = client.cursor.dropped;
+  for (std::size_t i = 0; i < kWebChannels; ++i)
+    if (client.subscriptions[i]) dropped += publisher_.missed(static_cast<WebChannel>(i), client.cursor);
+  return dropped;
 }
 
 /// Each client that has nothing to send is asked anew.
@@ -330,7 +334,7 @@ int WebServer::Work::open(lws* socket, Connection& connection) {
 void WebServer::Work::close(Connection& connection) {
   const WebClient* const client = std::exchange(connection.client, nullptr);
   if (client == nullptr) return;
-  dropped_by_gone_ += client->cursor.dropped;
+  dropped_by_gone_ += dropped_of(*client);
   clients_.remove_if([&](const WebClient& other) { return &other == client; });
   look_around();
 }

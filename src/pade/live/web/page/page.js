@@ -143,7 +143,8 @@ function drawRing (scan) {
 class MapScene {
   constructor (canvas) {
     this.canvas = canvas
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true })
+    this.gl = canvas.getContext('webgl2', { antialias: false })
+    this.renderer = new THREE.WebGLRenderer({ canvas, context: this.gl || undefined })
     this.scene = new THREE.Scene()
     this.scene.background = new THREE.Color(0x1d2226)
     this.camera = new THREE.PerspectiveCamera(50, 2, 0.1, 2000)
@@ -153,6 +154,14 @@ class MapScene {
     sun.position.set(1, -2, 3)
     this.scene.add(sun)
     this.blocks = new Map()
+    this.box = new THREE.BoxBufferGeometry(1, 1, 1)
+    this.material = new THREE.MeshLambertMaterial() // one for all: each is a program to be made
+    this.material.onBeforeCompile = (shader) => { // r111 knows no colour of an instance
+      shader.vertexShader = 'attribute vec3 tint;\nvarying vec3 vTint;\n' +
+        shader.vertexShader.replace('#include <begin_vertex>', '#include <begin_vertex>\nvTint = tint;')
+      shader.fragmentShader = 'varying vec3 vTint;\n' +
+        shader.fragmentShader.replace('#include <color_fragment>', 'diffuseColor.rgb *= vTint;')
+    }
     this.vehicle = new THREE.Mesh(new THREE.ConeBufferGeometry(0.3, 0.9, 12), new THREE.MeshLambertMaterial({ color: 0xffffff }))
     this.vehicle.geometry.rotateZ(-Math.PI / 2) // its point ahead: x
     this.scene.add(this.vehicle)
@@ -164,16 +173,31 @@ class MapScene {
     this.distance = 16
     this.changed = true
     this.listen()
-    let drawn = 0
-    const turn = (now) => { // ten times a second, and as fast as it goes while somebody drags
-      if (this.changed && (this.dragged || now - drawn > 100)) {
-        this.draw()
-        drawn = now
-        this.changed = this.dragged = false
-      }
-      window.requestAnimationFrame(turn)
+    this.fence = null // of the picture that is being drawn
+    this.begun = 0
+    this.next = 0
+    window.setInterval(() => this.turn(window.performance.now()), 30)
+  }
+
+  /// Ten times a second, and without a graphics card so seldom that what else there is to show does not wait.
+  turn (now) {
+    const gl = this.gl
+    if (this.fence) {
+      if (gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return
+      gl.deleteSync(this.fence)
+      this.fence = null
+      this.next = now + Math.max(100, 3 * (now - this.begun))
     }
-    turn(0)
+    if (!this.changed || now < this.next) return
+    this.changed = false
+    this.begun = now
+    this.draw()
+    if (!gl) {
+      this.next = now + 200
+      return
+    }
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0)
+    gl.flush()
   }
 
   listen () {
@@ -183,7 +207,7 @@ class MapScene {
       if (this.azimuth === null) this.azimuth = this.heading() + Math.PI
       this.azimuth -= 0.008 * e.movementX
       this.height = Math.min(1.5, Math.max(-0.3, this.height + 0.006 * e.movementY))
-      this.changed = this.dragged = true
+      this.changed = true
     })
     canvas.addEventListener('wheel', (e) => {
       this.distance = Math.min(300, Math.max(2, this.distance * Math.exp(0.001 * e.deltaY)))
@@ -202,7 +226,7 @@ class MapScene {
   draw () {
     const width = this.canvas.clientWidth
     const height = this.canvas.clientHeight
-    this.renderer.setSize(width, height, false)
+    if (this.canvas.width !== width || this.canvas.height !== height) this.renderer.setSize(width, height, false)
     this.camera.aspect = width / Math.max(1, height)
     this.camera.updateProjectionMatrix()
     const azimuth = this.azimuth === null ? this.heading() + Math.PI : this.azimuth
@@ -233,7 +257,6 @@ class MapScene {
     if (!mesh) return
     this.scene.remove(mesh)
     mesh.geometry.dispose()
-    mesh.material.dispose()
     this.blocks.delete(number)
   }
 
@@ -247,20 +270,23 @@ class MapScene {
   }
 
   put (marker) {
-    const geometry = new THREE.BoxBufferGeometry(marker.side, marker.side, marker.side)
-    const colours = new Float32Array(3 * marker.colours.length)
-    marker.colours.forEach((colour, i) => colours.set(colour.slice(0, 3), 3 * i))
-    geometry.setAttribute('tint', new THREE.InstancedBufferAttribute(colours, 3))
-    const material = new THREE.MeshLambertMaterial()
-    material.onBeforeCompile = (shader) => { // r111 knows no colour of an instance
-      shader.vertexShader = 'attribute vec3 tint;\nvarying vec3 vTint;\n' +
-        shader.vertexShader.replace('#include <begin_vertex>', '#include <begin_vertex>\nvTint = tint;')
-      shader.fragmentShader = 'varying vec3 vTint;\n' +
-        shader.fragmentShader.replace('#include <color_fragment>', 'diffuseColor.rgb *= vTint;')
+    const geometry = new THREE.BufferGeometry()
+    geometry.setIndex(this.box.index)
+    for (const name of ['position', 'normal']) geometry.setAttribute(name, this.box.getAttribute(name))
+    const count = marker.centres.length
+    const colours = new Float32Array(3 * count)
+    const matrices = new Float32Array(16 * count)
+    for (let i = 0; i < count; ++i) {
+      for (let k = 0; k < 3; ++k) {
+        colours[3 * i + k] = marker.colours[i][k]
+        matrices[16 * i + 5 * k] = marker.side
+        matrices[16 * i + 12 + k] = marker.centres[i][k]
+      }
+      matrices[16 * i + 15] = 1
     }
-    const mesh = new THREE.InstancedMesh(geometry, material, marker.centres.length)
-    const matrix = new THREE.Matrix4()
-    marker.centres.forEach((centre, i) => mesh.setMatrixAt(i, matrix.makeTranslation(...centre)))
+    geometry.setAttribute('tint', new THREE.InstancedBufferAttribute(colours, 3))
+    const mesh = new THREE.InstancedMesh(geometry, this.material, count)
+    mesh.instanceMatrix.array = matrices
     mesh.frustumCulled = false
     this.blocks.set(marker.number, mesh)
     this.scene.add(mesh)
