@@ -12,7 +12,7 @@ import numpy as np
 import pade
 
 PROGRAM = os.environ.get("PADE_PROGRAM") or shutil.which("pade") or "pade"
-FRAMES = 5
+FRAMES = 4
 
 
 @functools.lru_cache(maxsize=None)

@@ -13,32 +13,19 @@ import support
 
 
 class SameAsTheProgram(unittest.TestCase):
-    def same(self, name, config, **sequence):
-        file = support.scratch() / f"{name}.yaml"
-        file.write_text(config)
-        run = support.scratch() / name
-        support.run("map", support.flight(), "--out", run, "--config", file, "--no-report")
-        flight = pade.Sequence(support.flight(), file)
+    def test_the_map_of_a_folder_has_the_bytes_of_the_programs(self):  # with options: test_examples.py
+        run = support.scratch() / "run"
+        support.run("map", support.flight(), "--out", run, "--no-report")
+        flight = pade.Sequence(support.flight())
         mapper = pade.ObstacleMapper(flight.camera, flight.options["mapper"], flight.mask)
         for frame in flight:
             mapper.add(frame)
-        for kind in ("bt", "ot"):
-            written = support.scratch() / f"{name}.{kind}"
-            mapper.map.write(written)
-            self.assertEqual(written.read_bytes(), (run / f"map.{kind}").read_bytes())
+        for name in ("map.bt", "map.ot"):
+            mapper.map.write(support.scratch() / name)
+            self.assertEqual((support.scratch() / name).read_bytes(), (run / name).read_bytes())
         health = json.loads((run / "run.json").read_text())["health"]
         self.assertEqual(mapper.health["mapped"], health["depth_images"])
-        return flight, mapper
-
-    def test_same_bytes_with_the_defaults(self):
-        _, mapper = self.same("default", "{}")
         self.assertGreater(mapper.map.counts()["occupied"], 100)
-
-    def test_same_bytes_with_options(self):
-        flight, mapper = self.same("options", "mapper: {flow: dis-fast, views: {count: 0}, map: {voxel: 0.25}}\nsequence: {origin: flight}")
-        self.assertEqual(mapper.map.voxel, 0.25)
-        self.assertEqual(mapper.options["flow"], "dis-fast")
-        self.assertEqual(flight.options["sequence"]["origin"], "flight")
 
 
 class Threads(unittest.TestCase):
@@ -240,12 +227,17 @@ class Flights(unittest.TestCase):
         self.assertEqual(flight[-1].image.shape, (flight.camera.height, flight.camera.width))
         np.testing.assert_array_equal(flight[1].T_world_camera.matrix, flight.pose(1).matrix)
         self.assertEqual(flight.truth(0).dtype, np.float32)
-        with self.assertRaisesRegex(IndexError, "found frame 5, expected one of 5"):
+        with self.assertRaisesRegex(IndexError, f"found frame {support.FRAMES}, expected one of {support.FRAMES}"):
             flight[support.FRAMES]
 
     def test_a_folder_that_is_none_is_an_error(self):
         with self.assertRaisesRegex(pade.Error, "nowhere"):
             pade.Sequence("nowhere")
+
+    def test_options_are_those_of_a_config_file(self):
+        flight = pade.Sequence(support.flight(), "mapper: {map: {voxel: 0.25}}\nsequence: {origin: flight}")
+        self.assertEqual(flight.options["sequence"]["origin"], "flight")
+        self.assertEqual(pade.ObstacleMapper(flight.camera, flight.options["mapper"]).map.voxel, 0.25)
 
 
 if __name__ == "__main__":
