@@ -46,6 +46,16 @@ class Examples(unittest.TestCase):
         moved = re.search(r"the camera moved ([0-9.]+) m", run("navigate.py"))
         self.assertAlmostEqual(float(moved.group(1)), 0.305, delta=0.02)
 
+    def test_the_lines_of_the_documentation(self):
+        page = EXAMPLES.parent.parent / "docs" / "python.md"
+        if not page.exists():
+            self.skipTest(f"{page} is not there: tests without the sources")
+        (lines,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+        support.flight()
+        done = subprocess.run([sys.executable, "-B", "-c", lines], cwd=support.scratch(), capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, "occupied and [0-9]+ free voxels of 0.2 m")
+
 
 if __name__ == "__main__":
     unittest.main()
