@@ -25,6 +25,8 @@ __all__ = [
     "Frame",
     "Frames",
     "Hit",
+    "LocalPlan",
+    "LocalPlanner",
     "MapView",
     "MapperUpdate",
     "Navigator",
@@ -299,6 +301,7 @@ class MapView:
         self, place: npt.ArrayLike, reach: float, below: float, above: float, unknown: str = "blocked"
     ) -> npt.NDArray[np.float64]: ...
     def frontiers(self, lowest: npt.ArrayLike, highest: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+    def flown(self, path: npt.ArrayLike, radius: float) -> MapView: ...
     def distances(
         self, lowest: npt.ArrayLike, highest: npt.ArrayLike, unknown: str = "blocked", most: float = 5.0
     ) -> DistanceField: ...
@@ -380,6 +383,45 @@ def depth_of_pair(
     options: _Options = None,
     valid: npt.NDArray[np.uint8] | npt.NDArray[np.bool_] | None = None,
 ) -> MapperUpdate: ...
+
+class LocalPlan:
+    @property
+    def kind(self) -> str: ...
+    @property
+    def times(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def positions(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def velocities(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def yaws(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def command(self) -> dict[str, float]: ...
+    @property
+    def speed_limit(self) -> float: ...
+    @property
+    def free_reach(self) -> float: ...
+    @property
+    def radius(self) -> float: ...
+    @property
+    def choices(self) -> int: ...
+
+class LocalPlanner:
+    def __init__(self, options: _Options = None) -> None: ...
+    def plan(
+        self,
+        view: MapView,
+        time: float,
+        position: npt.ArrayLike,
+        velocity: npt.ArrayLike,
+        yaw: float,
+        goal: npt.ArrayLike,
+        *,
+        sigma: float = 0.0,
+        offset: float = 0.0,
+    ) -> LocalPlan: ...
+    @property
+    def options(self) -> dict[str, Any]: ...
 
 class AbsolutePose:
     @property

@@ -167,6 +167,7 @@ void add_depth(py::module_& module);
 void add_map(py::module_& module);
 void add_view(py::module_& module);
 void add_mapper(py::module_& module);
+void add_planning(py::module_& module);
 void add_navigation(py::module_& module);
 void add_sequence(py::module_& module);
 

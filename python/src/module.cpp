@@ -21,6 +21,7 @@ PYBIND11_MODULE(_pade, module) {
   add_map(module);
   add_view(module);
   add_mapper(module);
+  add_planning(module);
   add_navigation(module);
   add_sequence(module);
   py::list names;

@@ -244,6 +244,16 @@ void add_view(py::module_& module) {
           },
           py::arg("lowest"), py::arg("highest"),
           "Centres (n, 3) of the free voxels in a box that share a face with an unknown one.")
+      .def(
+          "flown",
+          [](const ViewHandle& v, const py::object& object, double radius) {
+            const std::vector<Eigen::Vector3d> path = path_of(object, "path");
+            positive(radius, "radius");
+            return ViewHandle{without_gil([&] { return v.view->flown(path, radius); })};
+          },
+          py::arg("path"), py::arg("radius"),
+          "The view as if unknown voxels within radius (m) of a path (n, 3) were free, where the vehicle "
+          "itself is or has been.")
       .def("distances", &distances, py::arg("lowest"), py::arg("highest"), py::arg("unknown") = "blocked",
            py::arg("most") = 5.0, "A DistanceField of a box; farther than most (m) counts as that far.")
       .def("__repr__", [](const ViewHandle& v) {

@@ -1,11 +1,13 @@
 """The examples, as their readers run them."""
 
+import os
 import pathlib
 import re
 import subprocess
 import sys
 import unittest
 
+import pade
 import support
 
 EXAMPLES = pathlib.Path(__file__).parent.parent / "examples"
@@ -52,7 +54,9 @@ class Examples(unittest.TestCase):
             self.skipTest(f"{page} is not there: tests without the sources")
         (lines,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
         support.flight()
-        done = subprocess.run([sys.executable, "-B", "-c", lines], cwd=support.scratch(), capture_output=True, text=True)
+        module = {"PYTHONPATH": str(pathlib.Path(pade.__file__).resolve().parent.parent)}
+        done = subprocess.run([sys.executable, "-B", "-c", lines], cwd=support.scratch(), env={**os.environ, **module},
+                              capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, "occupied and [0-9]+ free voxels of 0.2 m")
 

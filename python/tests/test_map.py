@@ -190,6 +190,41 @@ class MapQueries(unittest.TestCase):
             self.map.at([1, 2, 3, 4])
 
 
+class Planning(unittest.TestCase):
+    def test_a_plan_ends_in_a_stop_in_space_that_is_known_to_be_free(self):
+        camera = pade.Pose.from_quaternion([0, 0, 1.5], [0, 0, 0, 1]) @ pade.forward_camera()
+        seen = pade.OccupancyMap({"looks_baseline": 0})
+        seen.integrate(pade.DepthImage(np.full((120, 160), 8.05, np.float32)), support.camera(), camera)
+        self.assertEqual(seen.at([7.95, 0.05, 1.55]), pade.Occupancy.free)
+        view = pade.MapView(seen).flown([[0, 0, 1.5]], 1.2)
+        planner = pade.LocalPlanner({"peering": False})
+        time, position, velocity, yaw = 0.0, np.array([0, 0, 1.5]), np.zeros(3), 0.0
+        kinds = set()
+        for _ in range(30):  # towards a goal behind the wall
+            plan = planner.plan(view, time, position, velocity, yaw, [20, 0, 1.5])
+            kinds.add(plan.kind)
+            np.testing.assert_allclose(plan.velocities[-1], 0, atol=1e-6)
+            self.assertIsNone(view.sweep(plan.positions, planner.options["vehicle"]["radius"]))
+            time += 0.2
+            position = np.array([np.interp(time, plan.times, plan.positions[:, axis]) for axis in range(3)])
+            velocity = np.array([np.interp(time, plan.times, plan.velocities[:, axis]) for axis in range(3)])
+            yaw = float(np.interp(time, plan.times, plan.yaws))
+        self.assertIn("flying", kinds)
+        self.assertGreater(position[0], 2)
+        self.assertLess(position[0], 8 - planner.options["vehicle"]["radius"])
+        arrived = pade.LocalPlanner().plan(view, 0, [0, 0, 1.5], [0, 0, 0], 0, [0.2, 0, 1.5])
+        self.assertEqual(arrived.kind, "arrived")
+
+    def test_what_makes_no_sense_is_refused(self):
+        view = pade.MapView(pade.OccupancyMap())
+        with self.assertRaisesRegex(pade.Error, "expected finite numbers"):
+            pade.LocalPlanner().plan(view, 0, [0, 0, np.nan], [0, 0, 0], 0, [1, 0, 0])
+        with self.assertRaisesRegex(pade.Error, "sigma, offset: found -1"):
+            pade.LocalPlanner().plan(view, 0, [0, 0, 1], [0, 0, 0], 0, [1, 0, 0], sigma=-1)
+        with self.assertRaisesRegex(pade.Error, "speeed: found an unknown field"):
+            pade.LocalPlanner({"vehicle": {"speeed": 1}})
+
+
 class Navigation(unittest.TestCase):
     def setUp(self):
         """Three seconds at rest, then eastwards with 1 m/s^2."""
