@@ -50,6 +50,10 @@ def tag():
     return f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
 
 
+def extension():
+    return "_pade" + sysconfig.get_config_var("EXT_SUFFIX")
+
+
 def make_extension(settings):
     """The package as CMake leaves it."""
     folder = pathlib.Path((settings or {}).get("build-dir", root / "build")).resolve()
@@ -63,14 +67,16 @@ def make_extension(settings):
         print("+", *command, flush=True)
         if subprocess.run(command).returncode != 0:
             sys.exit(f"{command[0]} failed: see its output above")
-    return folder / "python" / "pade"
+    package = folder / "python" / "pade"
+    if not (package / extension()).exists():
+        sys.exit(f"{package}: found no {extension()}; {folder} was configured for another Python: choose another build-dir")
+    return package
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     package = make_extension(config_settings)
     version = cmake_project()[0]
-    extension = "_pade" + sysconfig.get_config_var("EXT_SUFFIX")
-    files = {f"pade/{name}": (package / name).read_bytes() for name in ("__init__.py", "_pade.pyi", "py.typed", extension)}
+    files = {f"pade/{name}": (package / name).read_bytes() for name in ("__init__.py", "_pade.pyi", "py.typed", extension())}
     info = f"pade-{version}.dist-info"
     files[f"{info}/METADATA"] = metadata().encode()
     files[f"{info}/WHEEL"] = f"Wheel-Version: 1.0\nGenerator: pade_build\nRoot-Is-Purelib: false\nTag: {tag()}\n".encode()

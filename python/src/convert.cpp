@@ -34,8 +34,7 @@ std::string names_of(std::initializer_list<int> types) {
 
 /// CV_8U ..., -1 if there is none.
 int element_of(const py::array& array) {
-  if (py::isinstance<py::array_t<std::uint8_t>>(array) || py::isinstance<py::array_t<bool>>(array))
-    return CV_8U;
+  if (py::isinstance<py::array_t<std::uint8_t>>(array)) return CV_8U;
   if (py::isinstance<py::array_t<std::uint16_t>>(array)) return CV_16U;
   if (py::isinstance<py::array_t<float>>(array)) return CV_32F;
   return -1;
@@ -91,6 +90,12 @@ cv::Mat image_of(py::handle object, std::string_view name, std::initializer_list
 
 cv::Mat optional_image(py::handle array, std::string_view name, std::initializer_list<int> types) {
   return array.is_none() ? cv::Mat() : image_of(array, name, types);
+}
+
+cv::Mat mask_of(py::handle array, std::string_view name) {
+  if (!py::isinstance<py::array_t<bool>>(array)) return optional_image(array, name, {CV_8UC1});
+  const py::object bytes = array.attr("astype")("uint8");
+  return 255 * image_of(bytes, name, {CV_8UC1});
 }
 
 py::object array_of(const cv::Mat& image, bool writeable) {

@@ -59,6 +59,8 @@ auto without_gil(Work&& work) {
 cv::Mat image_of(py::handle array, std::string_view name, std::initializer_list<int> types);
 /// The same; None gives an empty one.
 cv::Mat optional_image(py::handle array, std::string_view name, std::initializer_list<int> types);
+/// CV_8UC1, 0 where pixels do not count, of uint8 (as it is) or bool (a copy); None gives an empty one.
+cv::Mat mask_of(py::handle array, std::string_view name);
 /// An array that owns a reference to the memory of an image; None for an empty one. What others may read
 /// still is read-only.
 py::object array_of(const cv::Mat& image, bool writeable = true);

@@ -52,7 +52,7 @@ class Depth {
     if (!camera.is_pinhole())
       throw Refused("camera: found a lens with distortion, expected Camera.undistorted()");
     DepthInput_ images{optional_image(reference, "reference", {CV_8UC1}),
-                       optional_image(other, "other", {CV_8UC1}), optional_image(valid, "valid", {CV_8UC1})};
+                       optional_image(other, "other", {CV_8UC1}), mask_of(valid, "valid")};
     same_size(flow.vectors, camera.size(), "flow");
     same_size(images.reference, camera.size(), "reference");
     same_size(images.other, camera.size(), "other");

@@ -51,7 +51,7 @@ class Flow {
   }
 
   void set_mask(py::handle mask) {
-    cv::Mat kept = optional_image(mask, "mask", {CV_8UC1}).clone();
+    cv::Mat kept = mask_of(mask, "mask").clone();
     without_gil(mutex_, [&] {
       mask_ = kept;
       method_->set_mask(mask_);

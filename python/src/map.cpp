@@ -7,6 +7,7 @@
 
 #include "pade/core/camera.hpp"
 #include "pade/io/formats/map_files.hpp"
+#include "pade/io/text.hpp"
 
 #include "convert.hpp"
 #include "handles.hpp"
@@ -42,6 +43,9 @@ MapHandle read(py::handle file, const py::object& options) {
 
 void write(const MapHandle& handle, py::handle file, bool overwrite) {
   const std::filesystem::path path = path_of_file(file);
+  if (!overwrite && io::path_exists(path)) {
+    throw Refused(fmt::format("{}: found a file there, expected none, or overwrite=True", path.string()));
+  }
   succeed(without_gil(*handle.mutex, [&] {
     return io::write_map(*handle.map, path, overwrite ? io::Overwrite::replace : io::Overwrite::refuse);
   }));
@@ -64,6 +68,8 @@ py::dict integrate(MapHandle& handle, const DepthImage& image, const Camera& cam
   if (!handle.own)
     throw Refused(
         "integrate: found the map of a mapper, expected one of its own: the mapper's add() fills it");
+  if (!camera.is_pinhole())
+    throw Refused("camera: found a lens with distortion, expected Camera.undistorted()");
   const Pose pose = pose_of(T_world_camera, "T_world_camera");
   if (!pose.is_finite()) throw Refused("T_world_camera: found NaN or infinity, expected a finite pose");
   const cv::Size cells((camera.width + image.window - 1) / image.window,

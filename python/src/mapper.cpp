@@ -72,7 +72,7 @@ class Mapper {
   Mapper(const Camera& camera, const py::object& options, const py::object& valid)
       : mutex_(std::make_shared<std::mutex>()) {
     const auto wanted = options_of(options, ObstacleMapperOptions());
-    const cv::Mat mask = optional_image(valid, "valid", {CV_8UC1});
+    const cv::Mat mask = mask_of(valid, "valid");
     mapper_ = std::make_shared<ObstacleMapper>(value_of(ObstacleMapper::create(camera, wanted, mask)));
   }
 
@@ -155,7 +155,7 @@ Update depth_of_pair(const Camera& camera, const py::object& other, const py::ob
   const Pose to = pose_of(T_world_reference, "T_world_reference");
   const Matrix6d motion = covariance_of(covariance, "covariance");
   if (!(duration > 0)) throw Refused(fmt::format("duration: found {}, expected more than 0 s", duration));
-  const cv::Mat mask = optional_image(valid, "valid", {CV_8UC1});
+  const cv::Mat mask = mask_of(valid, "valid");
   Update update = without_gil([&] {
     ObstacleMapper mapper = value_of(ObstacleMapper::create(camera, wanted, mask));
     Update first = Update::of(mapper.add(older, Time{}, from));

@@ -27,7 +27,10 @@ PYBIND11_MODULE(_pade, module) {
   py::list names;
   for (const auto& entry : module.attr("__dict__").cast<py::dict>()) {
     const auto name = entry.first.cast<std::string>();
-    if (name.front() != '_') names.append(name);
+    if (name.front() == '_') continue;
+    names.append(name);
+    if (py::isinstance<py::type>(entry.second))
+      entry.second.attr("__module__") = "pade";  // as its users know it
   }
   module.attr("__all__") = names;
 }

@@ -155,7 +155,7 @@ void add_enumeration(py::module_& module, const char* name, const std::array<std
     members[py::str(member)] = value;
   }
   const py::object type =
-      py::module_::import("enum").attr("IntEnum")(name, members, py::arg("module") = "pade._pade");
+      py::module_::import("enum").attr("IntEnum")(name, members, py::arg("module") = "pade");
   type.attr("__doc__") = help;
   module.attr(name) = type;
 }

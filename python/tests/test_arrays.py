@@ -23,6 +23,7 @@ class ArraysIn(unittest.TestCase):
     def test_another_type_is_a_type_error_with_what_was_found_and_expected(self):
         self.refused(self.image.astype(np.float64), "float64 (64, 80)", "expected uint8 (height, width)")
         self.refused(self.image.astype(">u2"), ">u2 (64, 80)")
+        self.refused(self.image > 100, "bool (64, 80)")
         self.refused(self.image.tolist(), "found list, expected a numpy array of uint8")
         self.refused(None, "found NoneType")
 

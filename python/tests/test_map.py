@@ -33,9 +33,11 @@ class FlowMethods(unittest.TestCase):
         flow = pade.Flow("clg-fast-half")
         mask = np.ones((120, 160), np.uint8)
         mask[:, :50] = 0
-        flow.set_mask(mask)
-        vectors = flow.estimate(first, second).vectors
-        self.assertTrue(np.isnan(vectors[:, :50]).all())
+        for given in (mask, 255 * mask, mask.astype(bool)):
+            flow.set_mask(given)
+            vectors = flow.estimate(first, second).vectors
+            self.assertTrue(np.isnan(vectors[:, :50]).all())
+            np.testing.assert_allclose(np.median(vectors[20:-20, 80:-20], (0, 1)), [-4, 0], atol=0.1)
         with self.assertRaisesRegex(pade.Error, "mask: found 160 x 120 pixels, expected the image's 80 x 120"):
             flow.estimate(first[:, :80], second[:, :80])
 
@@ -100,7 +102,7 @@ class MapQueries(unittest.TestCase):
             self.map.write(file, overwrite=True)
             again = pade.OccupancyMap.read(file)
             np.testing.assert_array_equal(again.at(self.points), self.map.at(self.points))
-            with self.assertRaisesRegex(pade.Error, f"kept.{kind}"):
+            with self.assertRaisesRegex(pade.Error, f"kept.{kind}: found a file there, expected none, or overwrite=True"):
                 self.map.write(file)
         with self.assertRaisesRegex(pade.Error, "map.txt"):
             self.map.write(support.scratch() / "map.txt")
@@ -181,6 +183,9 @@ class MapQueries(unittest.TestCase):
                 pade.DepthImage(np.zeros((120, 160), np.float32)), support.camera(), np.eye(4)), "the map of a mapper"),
             (lambda: pade.OccupancyMap().integrate(
                 pade.DepthImage(np.zeros((2, 2), np.float32)), support.camera(), np.eye(4)), "found 2 x 2 cells"),
+            (lambda: pade.OccupancyMap().integrate(
+                pade.DepthImage(np.zeros((120, 160), np.float32)),
+                pade.Camera(160, 120, 120, 120, 80, 60, "equidistant", [0.1, 0, 0, 0]), np.eye(4)), "a lens with distortion"),
             (lambda: pade.OccupancyMap().integrate(
                 pade.DepthImage(np.zeros((120, 160), np.float32)), support.camera(), np.eye(4) * np.nan), "finite"),
         ):

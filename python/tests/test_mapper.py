@@ -21,8 +21,9 @@ class SameAsTheProgram(unittest.TestCase):
         for frame in flight:
             mapper.add(frame)
         for name in ("map.bt", "map.ot"):
-            mapper.map.write(support.scratch() / name)
-            self.assertEqual((support.scratch() / name).read_bytes(), (run / name).read_bytes())
+            written = support.scratch() / f"chain-{name}"
+            mapper.map.write(written)
+            self.assertEqual(written.read_bytes(), (run / name).read_bytes())
         health = json.loads((run / "run.json").read_text())["health"]
         self.assertEqual(mapper.health["mapped"], health["depth_images"])
         self.assertGreater(mapper.map.counts()["occupied"], 100)
@@ -214,6 +215,7 @@ class Options(unittest.TestCase):
 
     def test_errors_are_value_errors(self):
         self.assertTrue(issubclass(pade.Error, ValueError))
+        self.assertEqual(pade.Error.__module__, "pade")
         with self.assertRaisesRegex(ValueError, "undistorted pinhole"):
             pade.ObstacleMapper(pade.Camera(160, 120, 100, 100, 80, 60, "equidistant", [0.1, 0, 0, 0]))
 
@@ -233,6 +235,8 @@ class Flights(unittest.TestCase):
     def test_a_folder_that_is_none_is_an_error(self):
         with self.assertRaisesRegex(pade.Error, "nowhere"):
             pade.Sequence("nowhere")
+        with self.assertRaisesRegex(pade.Error, "T_body_camera is missing"):
+            pade.Sequence(support.flight(), {"sequence": {"poses": "from-imu-gnss"}})
 
     def test_options_are_those_of_a_config_file(self):
         flight = pade.Sequence(support.flight(), "mapper: {map: {voxel: 0.25}}\nsequence: {origin: flight}")
