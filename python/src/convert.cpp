@@ -228,7 +228,15 @@ Matrix6d covariance_of(py::handle object, std::string_view name) {
 }
 
 OptionText option_text(py::handle options) {
-  if (py::isinstance<py::str>(options)) return {options.cast<std::string>(), "options"};
+  if (py::isinstance<py::str>(options)) {
+    OptionText yaml{options.cast<std::string>(), "options"};
+    if (!yaml.text.empty() && yaml.text.find_first_of(":{#\n") == std::string::npos) {
+      throw Refused(fmt::format(
+          "options: found {}, expected YAML text ('name: value'), a dict, or a pathlib.Path of a YAML file",
+          io::in_quotes(yaml.text)));
+    }
+    return yaml;
+  }
   if (py::hasattr(options, "__fspath__")) {
     const std::filesystem::path file = path_of_file(options);
     return {value_of(io::read_file(file)), file.string()};

@@ -206,7 +206,8 @@ class Options(unittest.TestCase):
             ({"map": {"voxel": "wide"}}, "map.voxel: found 'wide', expected a number"),
             ({"flow": "magic"}, "unknown flow method 'magic'; expected one of"),
             ("map: [1", "found .*, expected YAML"),
-            ("0.2", "expected a mapping of options"),
+            ("[flow: dis-fast]", "expected a mapping of options"),
+            ("config.yaml", "found \"config.yaml\", expected YAML text .*, a dict, or a pathlib.Path of a YAML file"),
         ):
             with self.assertRaisesRegex(pade.Error, text):
                 pade.ObstacleMapper(self.camera, options)
