@@ -61,31 +61,31 @@ bool rows_are_contiguous(const py::array& array) {
 
 }  // namespace
 
-cv::Mat image_of(py::handle object, std::string_view name, std::initializer_list<int> types) {
-  if (!py::isinstance<py::array>(object)) {
+cv::Mat image_of(py::handle array, std::string_view name, std::initializer_list<int> types) {
+  if (!py::isinstance<py::array>(array)) {
     throw py::type_error(fmt::format("{}: found {}, expected a numpy array of {}", name,
-                                     std::string(py::str(py::type::handle_of(object).attr("__name__"))),
+                                     std::string(py::str(py::type::handle_of(array).attr("__name__"))),
                                      names_of(types)));
   }
-  const auto array = py::reinterpret_borrow<py::array>(object);
-  const int type = type_of(array);
+  const auto numbers = py::reinterpret_borrow<py::array>(array);
+  const int type = type_of(numbers);
   if (type < 0 || std::find(types.begin(), types.end(), type) == types.end()) {
     throw py::type_error(fmt::format("{}: found {} {}, expected {}", name,
-                                     std::string(py::str(array.dtype())), shape_text(array),
+                                     std::string(py::str(numbers.dtype())), shape_text(numbers),
                                      names_of(types)));
   }
-  if (array.size() == 0) return {};
-  if (!rows_are_contiguous(array)) {
+  if (numbers.size() == 0) return {};
+  if (!rows_are_contiguous(numbers)) {
     throw py::type_error(fmt::format(
         "{}: found rows that are not contiguous (shape {}, strides {}), expected contiguous rows; "
         "numpy.ascontiguousarray() copies an array so",
-        name, shape_text(array), std::string(py::str(array.attr("strides")))));
+        name, shape_text(numbers), std::string(py::str(numbers.attr("strides")))));
   }
   // OpenCV has no constant headers; nothing here writes through one.
-  void* const data = const_cast<void*>(array.data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+  void* const data = const_cast<void*>(numbers.data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   const std::size_t step =
-      array.shape(0) > 1 ? static_cast<std::size_t>(array.strides(0)) : std::size_t{cv::Mat::AUTO_STEP};
-  return {static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)), type, data, step};
+      numbers.shape(0) > 1 ? static_cast<std::size_t>(numbers.strides(0)) : std::size_t{cv::Mat::AUTO_STEP};
+  return {static_cast<int>(numbers.shape(0)), static_cast<int>(numbers.shape(1)), type, data, step};
 }
 
 cv::Mat optional_image(py::handle array, std::string_view name, std::initializer_list<int> types) {
@@ -224,7 +224,16 @@ Pose pose_of(py::handle object, std::string_view name) {
 }
 
 Matrix6d covariance_of(py::handle object, std::string_view name) {
-  return object.is_none() ? Matrix6d(Matrix6d::Zero()) : Matrix6d(matrix_of<6, 6>(object, name));
+  if (object.is_none()) return Matrix6d::Zero();
+  const Matrix6d covariance = matrix_of<6, 6>(object, name);
+  if (!covariance.allFinite() || covariance.diagonal().minCoeff() < 0 ||
+      !covariance.isApprox(covariance.transpose(), 1e-6)) {
+    throw Refused(fmt::format(
+        "{}: found a matrix that is no covariance, expected finite numbers, the same above and below the "
+        "diagonal, and none below 0 on it",
+        name));
+  }
+  return covariance;
 }
 
 OptionText option_text(py::handle options) {

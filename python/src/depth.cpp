@@ -80,6 +80,7 @@ class Depth {
 
 py::object derotate(py::handle object, const Camera& camera, const RelativeMotion& motion) {
   const cv::Mat image = image_of(object, "image", {CV_8UC1, CV_8UC3});
+  if (image.empty()) throw Refused("image: found no pixels, expected some");
   same_size(image, camera.size(), "image");
   return array_of(without_gil([&] { return depth::derotate_image(image, camera, motion); }));
 }

@@ -23,9 +23,10 @@ class Flow {
     const cv::Mat a = image_of(first, "first", {CV_8UC1});
     const cv::Mat b = image_of(second, "second", {CV_8UC1});
     const cv::Mat start = optional_image(initial, "initial", {CV_32FC2});
-    if (a.size() != b.size() || a.empty()) {
-      throw Refused(fmt::format("second: found {} x {} pixels, expected the first image's {} x {}, and some",
-                                b.cols, b.rows, a.cols, a.rows));
+    if (a.empty()) throw Refused("first: found no pixels, expected some");
+    if (a.size() != b.size()) {
+      throw Refused(fmt::format("second: found {} x {} pixels, expected the first image's {} x {}", b.cols,
+                                b.rows, a.cols, a.rows));
     }
     check(start, a, "initial");
     check(mask_, a, "mask");
@@ -97,6 +98,7 @@ std::unique_ptr<Flow> make_flow(const std::string& method, const std::string& co
 FlowField field_of(py::handle vectors, py::handle sigma) {
   FlowField field{image_of(vectors, "vectors", {CV_32FC2}).clone(),
                   optional_image(sigma, "sigma", {CV_32FC1}).clone()};
+  if (field.empty()) throw Refused("vectors: found no pixels, expected some");
   if (!field.sigma.empty() && field.sigma.size() != field.vectors.size()) {
     throw Refused(fmt::format("sigma: found {} x {} pixels, expected the vectors' {} x {}", field.sigma.cols,
                               field.sigma.rows, field.vectors.cols, field.vectors.rows));

@@ -65,6 +65,8 @@ class Filter {
     if (t2 < t1)
       throw Refused(fmt::format("t2: found {}, expected t1, {}, or later", to_string(t2), to_string(t1)));
     const Pose T_body_camera = pose_of(mounting, "T_body_camera");
+    if (!T_body_camera.is_finite())
+      throw Refused("T_body_camera: found NaN or infinity, expected a finite pose");
     return without_gil(mutex_, [&] { return navigator_.relative_pose(t1, t2, T_body_camera); });
   }
   py::dict health() {

@@ -41,8 +41,15 @@ class Planner {
         !from.velocity.allFinite() || !there.allFinite()) {
       throw Refused("time, position, velocity, yaw, goal: found NaN or infinity, expected finite numbers");
     }
-    if (!(sigma >= 0) || !(offset >= 0) || !std::isfinite(sigma + offset)) {
-      throw Refused(fmt::format("sigma, offset: found {} and {}, expected 0 m or more", sigma, offset));
+    constexpr double kFastest = 50;   // m/s; what is looked at grows with both
+    constexpr double kLeastSure = 5;  // m
+    if (from.velocity.norm() > kFastest) {
+      throw Refused(
+          fmt::format("velocity: found {:.3g} m/s, expected at most {}", from.velocity.norm(), kFastest));
+    }
+    if (!(sigma >= 0 && sigma <= kLeastSure) || !(offset >= 0 && offset <= kLeastSure)) {
+      throw Refused(
+          fmt::format("sigma, offset: found {} and {}, expected 0 to {} m", sigma, offset, kLeastSure));
     }
     return without_gil(mutex_, [&] {
       const planning::PlaceDoubt doubt{sigma, offset};

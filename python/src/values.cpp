@@ -111,8 +111,13 @@ void add_pose(py::module_& module) {
 
 RelativeMotion motion_of(py::handle T_world_reference, py::handle T_world_other, double duration,
                          py::handle covariance) {
-  RelativeMotion motion = relative_motion(pose_of(T_world_reference, "T_world_reference"),
-                                          pose_of(T_world_other, "T_world_other"), duration);
+  const Pose reference = pose_of(T_world_reference, "T_world_reference");
+  const Pose other = pose_of(T_world_other, "T_world_other");
+  if (!reference.is_finite() || !other.is_finite() || !std::isfinite(duration)) {
+    throw Refused(
+        "T_world_reference, T_world_other, duration: found NaN or infinity, expected finite numbers");
+  }
+  RelativeMotion motion = relative_motion(reference, other, duration);
   motion.covariance = covariance_of(covariance, "covariance");
   return motion;
 }

@@ -37,6 +37,23 @@ double positive(double value, std::string_view name) {
   return value;
 }
 
+/// What is looked at voxel by voxel takes a second for some ten millions of them, and cannot be interrupted:
+/// a slip in the unit must not take hours.
+void limited(double volume, const MapView& view, std::string_view what) {
+  constexpr double kMost = 2e8;
+  const double voxels = volume / std::pow(view.voxel(), 3);
+  if (voxels <= kMost) return;
+  throw Refused(fmt::format("{}: found {:.3g} voxels of {} m in there, expected at most {:.3g}", what, voxels,
+                            view.voxel(), kMost));
+}
+void limited_box(const Eigen::AlignedBox3d& box, const MapView& view) {
+  limited(box.volume(), view, "lowest, highest");
+}
+void limited_ball(double radius, const MapView& view) {
+  positive(radius, "radius");
+  limited(4.2 * radius * radius * radius, view, "radius");
+}
+
 Eigen::Vector3d direction_of(py::handle object) {
   Eigen::Vector3d direction = vector_of(object, "direction");
   if (!direction.allFinite() || direction.isZero(0))
@@ -87,7 +104,7 @@ py::array_t<double> rays(const ViewHandle& handle, py::handle origins, py::handl
 std::optional<mapping::Hit> sweep(const ViewHandle& handle, py::handle object, double radius,
                                   const std::string& unknown) {
   const std::vector<Eigen::Vector3d> path = path_of(object, "path");
-  positive(radius, "radius");
+  limited_ball(radius, *handle.view);
   const UnknownSpace space = unknown_of(unknown);
   return without_gil([&] { return handle.view->sweep(path, radius, space); });
 }
@@ -101,6 +118,11 @@ py::array_t<double> sectors(const ViewHandle& handle, py::handle place, double r
                             double above, const std::string& unknown) {
   const Eigen::Vector3d at = vector_of(place, "place");
   positive(reach, "reach");
+  if (!at.allFinite() || !(below >= 0) || !(above >= 0) || !std::isfinite(below + above)) {
+    throw Refused(
+        "place, below, above: found NaN, infinity or less than 0, expected a finite place and 0 m or more");
+  }
+  limited(4 * reach * reach * (below + above), *handle.view, "reach, below, above");
   const UnknownSpace space = unknown_of(unknown);
   const auto distances =
       without_gil([&] { return mapping::sectors(*handle.view, at, reach, below, above, space); });
@@ -110,6 +132,7 @@ py::array_t<double> sectors(const ViewHandle& handle, py::handle place, double r
 mapping::DistanceField distances(const ViewHandle& handle, py::handle lowest, py::handle highest,
                                  const std::string& unknown, double most) {
   const Eigen::AlignedBox3d box = box_of(lowest, highest);
+  limited_box(box, *handle.view);
   positive(most, "most");
   const UnknownSpace space = unknown_of(unknown);
   return without_gil([&] { return mapping::DistanceField::of(*handle.view, box, space, most); });
@@ -217,6 +240,7 @@ void add_view(py::module_& module) {
           "in_box",
           [](const ViewHandle& v, const py::object& lowest, const py::object& highest) {
             const Eigen::AlignedBox3d box = box_of(lowest, highest);
+            limited_box(box, *v.view);
             return dict_of_contents(without_gil([&] { return v.view->in_box(box); }));
           },
           py::arg("lowest"), py::arg("highest"),
@@ -225,7 +249,7 @@ void add_view(py::module_& module) {
           "in_ball",
           [](const ViewHandle& v, const py::object& centre, double radius) {
             const Eigen::Vector3d at = vector_of(centre, "centre");
-            positive(radius, "radius");
+            limited_ball(radius, *v.view);
             return dict_of_contents(without_gil([&] { return v.view->in_ball(at, radius); }));
           },
           py::arg("centre"), py::arg("radius"),
@@ -240,6 +264,7 @@ void add_view(py::module_& module) {
           "frontiers",
           [](const ViewHandle& v, const py::object& lowest, const py::object& highest) {
             const Eigen::AlignedBox3d box = box_of(lowest, highest);
+            limited_box(box, *v.view);
             return array_of(without_gil([&] { return mapping::frontiers(*v.view, box); }));
           },
           py::arg("lowest"), py::arg("highest"),
@@ -248,7 +273,7 @@ void add_view(py::module_& module) {
           "flown",
           [](const ViewHandle& v, const py::object& object, double radius) {
             const std::vector<Eigen::Vector3d> path = path_of(object, "path");
-            positive(radius, "radius");
+            limited_ball(radius, *v.view);
             return ViewHandle{without_gil([&] { return v.view->flown(path, radius); })};
           },
           py::arg("path"), py::arg("radius"),

@@ -179,6 +179,18 @@ class MapQueries(unittest.TestCase):
             (lambda: self.view.ray([0, 0, 0], [0, 0, 1], 1, "maybe"), "unknown: found 'maybe', expected one of blocked, free"),
             (lambda: self.view.sweep([[0, 0, 0]], -1), "radius: found -1"),
             (lambda: self.view.in_box([0, 0, 0], [1, 1, -1]), "found no box"),
+            (lambda: self.view.in_box([-1e3] * 3, [1e3] * 3), r"found 8e\+12 voxels of 0.1 m in there, expected at most 2e\+08"),
+            (lambda: self.view.distances([-1e3] * 3, [1e3] * 3), "lowest, highest: found"),
+            (lambda: self.view.sweep([[0, 0, 0]], 1e6), "radius: found"),
+            (lambda: self.view.sectors([0, 0, 0], 1e6, 1, 1), "reach, below, above: found"),
+            (lambda: self.view.sectors([0, 0, np.nan], 5, 1, 1), "place, below, above: found NaN"),
+            (lambda: pade.RelativeMotion(np.eye(4) * np.nan, np.eye(4)), "expected finite numbers"),
+            (lambda: pade.RelativeMotion(np.eye(4), np.eye(4), 0.1, -np.eye(6)), "covariance: found a matrix that is no covariance"),
+            (lambda: pade.ObstacleMapper(support.camera()).add(
+                np.zeros((120, 160), np.uint8), 0, np.eye(4), np.full((6, 6), np.nan)), "motion_covariance: found a matrix that is no"),
+            (lambda: pade.derotate_image(np.zeros((0, 0), np.uint8), support.camera(), pade.RelativeMotion(np.eye(4), np.eye(4))),
+             "image: found no pixels"),
+            (lambda: pade.FlowField(np.zeros((0, 5, 2), np.float32)), "vectors: found no pixels"),
             (lambda: pade.ObstacleMapper(support.camera()).map.integrate(
                 pade.DepthImage(np.zeros((120, 160), np.float32)), support.camera(), np.eye(4)), "the map of a mapper"),
             (lambda: pade.OccupancyMap().integrate(
@@ -226,6 +238,8 @@ class Planning(unittest.TestCase):
             pade.LocalPlanner().plan(view, 0, [0, 0, np.nan], [0, 0, 0], 0, [1, 0, 0])
         with self.assertRaisesRegex(pade.Error, "sigma, offset: found -1"):
             pade.LocalPlanner().plan(view, 0, [0, 0, 1], [0, 0, 0], 0, [1, 0, 0], sigma=-1)
+        with self.assertRaisesRegex(pade.Error, r"velocity: found 1e\+06 m/s, expected at most 50"):
+            pade.LocalPlanner().plan(view, 0, [0, 0, 1], [1e6, 0, 0], 0, [1, 0, 0])
         with self.assertRaisesRegex(pade.Error, "speeed: found an unknown field"):
             pade.LocalPlanner({"vehicle": {"speeed": 1}})
 
