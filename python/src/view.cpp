@@ -274,6 +274,9 @@ void add_view(py::module_& module) {
           [](const ViewHandle& v, const py::object& object, double radius) {
             const std::vector<Eigen::Vector3d> path = path_of(object, "path");
             limited_ball(radius, *v.view);
+            double length = 0;
+            for (std::size_t k = 1; k < path.size(); ++k) length += (path[k] - path[k - 1]).norm();
+            limited(3.2 * radius * radius * length, *v.view, "path");
             return ViewHandle{without_gil([&] { return v.view->flown(path, radius); })};
           },
           py::arg("path"), py::arg("radius"),

@@ -182,6 +182,7 @@ class MapQueries(unittest.TestCase):
             (lambda: self.view.in_box([-1e3] * 3, [1e3] * 3), r"found 8e\+12 voxels of 0.1 m in there, expected at most 2e\+08"),
             (lambda: self.view.distances([-1e3] * 3, [1e3] * 3), "lowest, highest: found"),
             (lambda: self.view.sweep([[0, 0, 0]], 1e6), "radius: found"),
+            (lambda: self.view.flown([[0, 0, 0], [1e5, 0, 0]], 3), "path: found"),
             (lambda: self.view.sectors([0, 0, 0], 1e6, 1, 1), "reach, below, above: found"),
             (lambda: self.view.sectors([0, 0, np.nan], 5, 1, 1), "place, below, above: found NaN"),
             (lambda: pade.RelativeMotion(np.eye(4) * np.nan, np.eye(4)), "expected finite numbers"),
