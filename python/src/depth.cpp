@@ -125,8 +125,11 @@ void add_depth(py::module_& module) {
           "nothing is "
           "known.")
       .def("__repr__", [](const DepthImage& d) {
-        return fmt::format("<pade.DepthImage of {} x {}, {} with a depth>", d.depth.cols, d.depth.rows,
-                           d.depth.empty() ? 0 : cv::countNonZero(d.depth == d.depth));
+        return fmt::format(
+            "<pade.DepthImage of {} x {}, {} with a depth>", d.depth.cols, d.depth.rows,
+            d.depth.empty()
+                ? 0
+                : cv::countNonZero(d.depth == d.depth));  // NOLINT(misc-redundant-expression): NaN
       });
 
   py::class_<Depth>(module, "DepthEstimator",
