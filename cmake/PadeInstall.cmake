@@ -1,5 +1,5 @@
-# What `cmake --install` and `cpack` put where: the program (component "pade") and the library with its headers
-# (component "libpade-dev").
+# What `cmake --install` and `cpack` put where: the program (component "pade"), the library with its headers (component
+# "libpade-dev") and, where it is built, the Python module (component "python3-pade", whose files python/ installs).
 include(CMakePackageConfigHelpers)
 
 set(pade_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pade)
@@ -71,7 +71,7 @@ foreach(component pade libpade-dev)
           COMPONENT ${component})
 endforeach()
 
-# Two Debian packages: cpack -G DEB
+# Two Debian packages, three with the Python module: cpack -G DEB
 set(CPACK_PACKAGE_NAME pade)
 set(CPACK_PACKAGE_CONTACT "The PADE authors <${PROJECT_HOMEPAGE_URL}/issues>")
 set(CPACK_DEBIAN_PACKAGE_HOMEPAGE ${PROJECT_HOMEPAGE_URL})
@@ -102,6 +102,16 @@ foreach(pair IN ITEMS bzip2/libbz2-dev lz4/liblz4-dev sqlite/libsqlite3-dev zstd
     string(APPEND CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_DEPENDS ", ${package}")
   endif()
 endforeach()
+if(PADE_BUILD_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python3-pade)
+  set(CPACK_DEBIAN_PYTHON3-PADE_PACKAGE_NAME python3-pade)
+  set(CPACK_DEBIAN_PYTHON3-PADE_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON3-PADE_PACKAGE_SHLIBDEPS ON)
+  math(EXPR _next_python "${PADE_PYTHON_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON3-PADE_PACKAGE_DEPENDS
+      "python3 (>= 3.${PADE_PYTHON_MINOR}), python3 (<< 3.${_next_python}), python3-numpy")
+  set(CPACK_COMPONENT_PYTHON3-PADE_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: the Python module.")
+endif()
 set(CPACK_COMPONENT_PADE_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: the program.")
 set(CPACK_COMPONENT_LIBPADE-DEV_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: library, headers and CMake files.")
 include(CPack)

@@ -1,4 +1,4 @@
-# Shared by scripts/run, scripts/test, scripts/lint and .ci/run: what the project needs from Debian, how it gets
+# Shared by scripts/run, scripts/test, scripts/lint, scripts/python and .ci/run: what the project needs from Debian, how it gets
 # there, and how the tree is built. Sourced, not run; the caller has `set -euo pipefail`.
 # shellcheck shell=bash disable=SC2034  # the lists and assume_yes are used by the scripts that source this
 
@@ -19,8 +19,10 @@ packages_build=(
 packages_test=(libgtest-dev libgmock-dev)
 packages_lint=(clang-format clang-tidy)
 packages_docs=(doxygen)
+packages_python=(pybind11-dev python3-dev python3-numpy python3-build python3-venv mypy)  # for scripts/python alone
 
 assume_yes=false
+configure_options=()  # beside those of the preset
 
 say() {
   if [ -t 1 ]; then printf '\033[1m%s\033[0m\n' "$*"; else printf '%s\n' "$*"; fi
@@ -125,7 +127,7 @@ configure() {
   mkdir -p "$root/$2"
   # A folder that was configured by hand keeps its generator.
   [ -f "$root/$2/CMakeCache.txt" ] || export CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}
-  (cd "$root" && cmake --preset "$1") >"$log" 2>&1 || {
+  (cd "$root" && cmake --preset "$1" "${configure_options[@]}") >"$log" 2>&1 || {
     cat "$log" >&2
     die "CMake could not configure $2/"
   }

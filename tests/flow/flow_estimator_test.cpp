@@ -334,6 +334,18 @@ INSTANTIATE_TEST_SUITE_P(Methods, OwnFlow,
                            return text;
                          });
 
+TEST(OpenCvFlow, OfDisIsTheSameForAViewAndItsCopy) {
+  const ShiftedPair pair = shifted_pair({150, 130}, {1.5, -0.5});
+  const cv::Rect part(13, 7, 101, 93);
+  for (const std::string name : {"dis-ultrafast", "dis-fast", "dis-medium"}) {
+    auto method = make(name);
+    const FlowField of_view = method->estimate(pair.first(part), pair.second(part));
+    const FlowField of_copy = method->estimate(pair.first(part).clone(), pair.second(part).clone());
+    EXPECT_FALSE(std::isnan(of_view.vectors.at<cv::Vec2f>(45, 50)[0])) << name;
+    EXPECT_TRUE(same_bits(of_view.vectors, of_copy.vectors)) << name;
+  }
+}
+
 TEST(OpenCvFlow, SurvivesEverySizeAndRefusesImagesThatDoNotFit) {
   for (const std::string name :
        {"dis-ultrafast", "dis-fast", "dis-medium", "opencv-farneback", "opencv-pyrlk"}) {

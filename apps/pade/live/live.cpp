@@ -234,6 +234,8 @@ class LiveLog {
     say(fmt::format("{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
                     live::text_of(link), age(progress.image), age(progress.depth), link.sectors_sent,
                     link.in.packets, link.in.bad, link.in.gaps));
+    if (link.level_instead)
+      say("the autopilot does not know OBSTACLE_DISTANCE_3D: it gets OBSTACLE_DISTANCE (link.obstacles: level)\n");
     if (!stamps.empty()) say(stamps + "\n");
     if (web != nullptr) say(web->text() + "\n");
   }
@@ -381,12 +383,8 @@ void add_live(CLI::App& app, Context& context) {
       app.add_subcommand("live", "Map beside an autopilot: camera and MAVLink in, OBSTACLE_DISTANCE out");
   command->footer(
       "Runs until SIGTERM or Ctrl-C, saves the map meanwhile and at the end. docs/live.md has the wiring, "
-      "the autopilots' "
-      "parameters "
-      "and the file.\n"
-      "What does not exist yet: poses from our own filter, OBSTACLE_DISTANCE_3D, "
-      "signing, RTSP "
-      "and video\nfiles, ROS, DDS.");
+      "the autopilots' parameters and the file.\n"
+      "What does not exist yet: signing, RTSP and video files, ROS, DDS.");
   command->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map, web")
       ->required();
   command->add_flag("--web", arguments->web,

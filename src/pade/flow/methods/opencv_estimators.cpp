@@ -30,6 +30,9 @@ cv::Mat start_of(const cv::Mat& initial, const cv::Mat& first) {
   return initial.size() == first.size() && initial.type() == CV_32FC2 ? initial.clone() : cv::Mat();
 }
 
+// DIS takes no part of an image.
+cv::Mat whole(const cv::Mat& image) { return image.isContinuous() ? image : image.clone(); }
+
 class Farneback final : public FlowEstimator {
  public:
   FlowField estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) override {
@@ -51,7 +54,7 @@ class Dis final : public FlowEstimator {
   FlowField estimate(const cv::Mat& first, const cv::Mat& second, const cv::Mat& initial) override {
     return guarded(first, second, [&] {
       cv::Mat vectors = start_of(initial, first);
-      method_->calc(first, second, vectors);
+      method_->calc(whole(first), whole(second), vectors);
       return vectors;
     });
   }
