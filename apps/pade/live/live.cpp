@@ -235,7 +235,8 @@ class LiveLog {
                     live::text_of(link), age(progress.image), age(progress.depth), link.sectors_sent,
                     link.in.packets, link.in.bad, link.in.gaps));
     if (link.level_instead)
-      say("the autopilot does not know OBSTACLE_DISTANCE_3D: it gets OBSTACLE_DISTANCE (link.obstacles: level)\n");
+      say("the autopilot does not know OBSTACLE_DISTANCE_3D: it gets OBSTACLE_DISTANCE (link.obstacles: "
+          "level)\n");
     if (!stamps.empty()) say(stamps + "\n");
     if (web != nullptr) say(web->text() + "\n");
   }
