@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "pade/core/random.hpp"
@@ -154,9 +155,16 @@ double wrong_of_flagged(const std::vector<evaluation::MotionError>& errors) {
 struct Range {
   double least = 1e300;
   double most = -1e300;
+  double sum = 0;
+  int count = 0;
   void add(double value) {
     least = std::min(least, value);
     most = std::max(most, value);
+    sum += value;
+    ++count;
+  }
+  [[nodiscard]] std::string text() const {
+    return fmt::format("{:.2f} ({:.2f}-{:.2f})", sum / count, least, most);
   }
 };
 
@@ -183,12 +191,11 @@ struct Table {
     std::printf(
         "%s: 0.1 s 95 %% %.3f cm, median %.3f cm; velocity %.2f cm/s; flagged wrong %.2f %% (pooled %.2f "
         "%%), good "
-        "flagged %.1f %%; NEES pose %.2f..%.2f translation %.2f..%.2f rotation %.2f..%.2f; rotation %.4f "
-        "deg; lost "
-        "%d\n",
+        "flagged %.1f %%; NEES, mean of the seeds (least-most): pose %s translation %s rotation %s; rotation "
+        "%.4f deg; lost %d\n",
         name, t95.most, t50.most, velocity.most, wrong.most, 100 * wrong_of_flagged(pooled), kept.least,
-        pose_nees.least, pose_nees.most, translation_nees.least, translation_nees.most, rotation_nees.least,
-        rotation_nees.most, rotation.most, static_cast<int>(lost));
+        pose_nees.text().c_str(), translation_nees.text().c_str(), rotation_nees.text().c_str(),
+        rotation.most, static_cast<int>(lost));
   }
 };
 
