@@ -159,6 +159,32 @@ TEST(AutopilotSensors, RawImuIsMilliGOfArduPilotAndNothingOfOthers) {
   EXPECT_THAT(none.error().message, HasSubstr("the IMU is missing: found 50 RAW_IMU of PX4"));
 }
 
+/// On a link without end: what was taken is not kept; the better message counts while it comes, and no
+/// longer.
+TEST(AutopilotSensors, WhatIsTakenIsTheNewOfTheBestSourceThatStillComes) {
+  SensorGatherer gatherer(kArduPilot, {});
+  mavlink::Sender sender{1, 1, 0};
+  const auto add = [&](const auto& message) {
+    const mavlink::Packet packet = pack(message, sender);
+    gatherer.add(mavlink::look(packet.span()).frame);
+  };
+  mavlink::RawImu raw;
+  raw.xacc = 100;
+  std::size_t taken = 0;
+  for (std::uint64_t us = 0; us < 5'000'000; us += 20'000) {
+    raw.time_usec = us;
+    add(raw);
+    add(raw);                               // once more
+    if (us == 2'000'000) add(highres(us));  // somebody else has asked for one
+    const NewSamples samples = gatherer.take();
+    taken += samples.imu.size();
+    for (const ImuSample& sample : samples.imu)
+      EXPECT_EQ(sample.time.nanoseconds, 1000 * static_cast<std::int64_t>(us));
+  }
+  EXPECT_LE(taken, 250U);
+  EXPECT_GE(taken, 199U) << "all but those of the second after it";
+}
+
 TEST(AutopilotSensors, StampsSince1970BecomeThoseSinceTheStart) {
   constexpr std::uint64_t kStart = 1'700'000'000'000'000;
   Stream stream(kPx4);

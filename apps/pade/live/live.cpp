@@ -18,6 +18,7 @@
 #include "pade/io/formats/map_files.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/config.hpp"
+#include "pade/live/link/filtered_poses.hpp"
 #include "pade/live/map_saver.hpp"
 #include "pade/live/recordings/session_recorder.hpp"
 #include "pade/live/service.hpp"
@@ -142,7 +143,8 @@ Status check_parts(LiveParts& parts) {
                                   : "no answer to TIMESYNC") &&
          good;
   good =
-      report("poses", link.poses_come,
+      // Before take-off our own filter has all that it needs but for the heading.
+      report("poses", link.poses_come || link.poses_missing == live::heading_unknown,
              link.refused.empty() || link.poses_come
                  ? link.poses_missing.empty() ? link.poses_summary
                                               : fmt::format("{} ({})", link.poses_missing, link.poses_summary)
@@ -323,6 +325,7 @@ Status run_live(const LiveArguments& arguments) {
   if (arguments.check) return check_parts(*parts);
   const auto sight = live::SectorView::of(parts->camera.source->camera(), parts->camera.T_body_camera);
   live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth, sight);
+  sectors.time_offset = options.session.time_offset;
   if (options.link.obstacles == live::ObstacleMessages::faces)
     sectors.see_points(parts->camera.source->camera(), parts->camera.T_body_camera);
   std::vector<live::Sink*> sinks{&sectors};

@@ -49,13 +49,18 @@ const auto& longest(const Channels& sources) {
       ->samples;
 }
 
-/// Of the first source that ever had any; nothing stays of the others.
+/// Of the first source that still comes; nothing stays of the others.
 template <class Channels>
 auto take_first(Channels& sources) {
+  constexpr double kSilent = 1;  // s, after which another source takes over
+  std::optional<Time> newest;
+  for (const auto& source : sources) {
+    if (source.last && (!newest || *newest < *source.last)) newest = source.last;
+  }
   decltype(sources[0].samples) taken;
   bool found = false;
   for (auto& source : sources) {
-    if (!found && source.last) {
+    if (!found && source.last && seconds_between(*source.last, *newest) < kSilent) {
       found = true;
       taken = std::move(source.samples);
     }

@@ -75,7 +75,7 @@ class SensorGatherer {
   [[nodiscard]] Result<NavigationLog> log(const std::string& name) const;
   /// Hands over what came since the last call, and keeps none of it: for a link, which has no end. Where the
   /// same comes in several messages, those of HIGHRES_IMU count, else of SCALED_IMU (SCALED_PRESSURE), as
-  /// soon as there is one.
+  /// soon as there is one and until it has been silent for a second.
   [[nodiscard]] NewSamples take();
   [[nodiscard]] std::size_t unitless() const { return unitless_; }        ///< RAW_IMU that nobody can read
   [[nodiscard]] std::size_t without_fix() const { return without_fix_; }  ///< fixes in fewer dimensions

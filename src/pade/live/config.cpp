@@ -44,6 +44,15 @@ Status check(const LiveOptions& options) {
     return Error{
         fmt::format("record: found \"{}\", expected a name that ends in .mcap or .bag", options.record)};
   if (const Status status = within("navigator", navigation::check(options.navigator)); !status) return status;
+  if (options.navigator.camera_time_offset != 0)
+    return Error{
+        fmt::format("navigator.camera_time_offset: found {}, expected 0: session.time_offset is for that",
+                    options.navigator.camera_time_offset)};
+  if (options.navigator.filter.raw_gnss || options.navigator.filter.camera)
+    return Error{
+        "navigator.filter.raw_gnss, camera: found one that is on, expected both off: an autopilot sends "
+        "neither raw "
+        "GNSS nor the motions of a camera"};
   return within("mapper", check(options.mapper));
 }
 

@@ -128,13 +128,11 @@ void SectorSink::take(const LiveUpdate& update) {
   const auto distances = obstacle_distances(*update.view, update.T_world_body, options_, view_);
   const bool says_anything =
       std::any_of(distances.begin(), distances.end(), [](std::uint16_t d) { return d != kUnknownDistance; });
-  std::optional<FrameObstacles> obstacles;
-  if (says_anything) {
-    obstacles = FrameObstacles{obstacle_distance_message(distances, update.time, options_), {}, options_};
-    if (eye_)
-      obstacles->points =
-          obstacle_points(*update.view, update.T_world_body, options_, eye_->camera, eye_->T_body_camera);
-  }
+  FrameObstacles obstacles{{}, {}, options_, time_offset};
+  if (says_anything) obstacles.level = obstacle_distance_message(distances, update.time, options_);
+  if (eye_)
+    obstacles.points =
+        obstacle_points(*update.view, update.T_world_body, options_, eye_->camera, eye_->T_body_camera);
   link_.offer(obstacles, update.time);
   if (listener) listener(distances, update.time);
 }

@@ -67,6 +67,7 @@ class SectorSink : public Sink {
   /// Obstacles as points too, of what this camera sees.
   /// @param camera  undistorted
   void see_points(const Camera& camera, const Pose& T_body_camera) { eye_ = Eye{camera, T_body_camera}; }
+  double time_offset = 0;  ///< time of the pose = time of the frame + this, s (SessionOptions)
   /// Told of all distances before they are turned to the newest heading; the mapper's thread. To be set
   /// before the session runs.
   std::function<void(const std::array<std::uint16_t, kBins>& distances, Time frame)> listener;

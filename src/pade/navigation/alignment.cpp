@@ -45,6 +45,13 @@ std::optional<GnssVelocity> velocity_in(const Measurement& m) {
   return GnssVelocity{m.time, m.value, m.covariance};
 }
 
+/// Faster than the noise of what is measured of it explains.
+bool shows_motion(const GnssVelocity& velocity, double rest_speed) {
+  const Vector3d axes = measured_axes(velocity);
+  const double variance = axes.cwiseProduct(velocity.covariance.diagonal()).sum();
+  return axes.cwiseProduct(velocity.velocity).norm() > rest_speed + 3 * std::sqrt(variance);
+}
+
 std::optional<GnssFix> fix_in(const Measurement& m) {
   if (m.kind == SensorKind::raw_gnss) return m.raw->fix;
   if (m.kind != SensorKind::gnss_position) return std::nullopt;
@@ -122,8 +129,7 @@ std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const A
     const Measurement& m = timeline.measurements[i];
     const auto velocity = velocity_in(m);
     if (!velocity) continue;
-    if (velocity->velocity.norm() > options.rest_speed + 3 * std::sqrt(velocity->covariance.trace()))
-      return std::nullopt;
+    if (shows_motion(*velocity, options.rest_speed)) return std::nullopt;
   }
   return RestMeans{now, rate, force, options.level_time};
 }
@@ -185,7 +191,7 @@ bool Alignment::start_from_rest(Timeline& timeline, Time now) {
 
 bool Alignment::is_moving(const Timeline& timeline, Time now) const {
   const auto last = last_gnss(timeline, earlier(now, 0.5), now, velocity_in);
-  return last && last->velocity.norm() > options_.rest_speed + 3 * std::sqrt(last->covariance.trace());
+  return last && shows_motion(*last, options_.rest_speed);
 }
 
 bool Alignment::start_in_motion(Timeline& timeline, Time now) {

@@ -47,6 +47,11 @@ class LoopPort : public Port {
   Line& line_;
 };
 
+FrameObstacles with(const std::optional<mavlink::ObstacleDistance>& level,
+                    std::optional<std::vector<Eigen::Vector3d>> points = {}) {
+  return {level, std::move(points), {}, 0};
+}
+
 /// An autopilot that flies north at 2 m/s, heading north, and whose clock is 1000 s behind ours.
 class Bench {
  public:
@@ -243,10 +248,10 @@ TEST(AutopilotLink, NamesHoverWhereThereIsNoDepth) { expect_said(&Bench::depth, 
 TEST(AutopilotLink, SectorsAreSentOnceAndNeverOld) {
   Bench bench;
   bench.run(5);
-  bench.link().offer(FrameObstacles{}, {bench.now().nanoseconds - 100 * kMillisecond});
+  bench.link().offer(with(mavlink::ObstacleDistance{}), {bench.now().nanoseconds - 100 * kMillisecond});
   bench.run(1);
   EXPECT_EQ(bench.sectors.size(), 1U);
-  bench.link().offer(FrameObstacles{}, {bench.now().nanoseconds - 350 * kMillisecond});
+  bench.link().offer(with(mavlink::ObstacleDistance{}), {bench.now().nanoseconds - 350 * kMillisecond});
   bench.run(1);
   EXPECT_EQ(bench.sectors.size(), 1U);
   EXPECT_EQ(bench.link().report().sectors_stale, 1U);
@@ -263,7 +268,7 @@ TEST(AutopilotLink, SectorsAreTurnedToTheHeadingAtWhichTheyLeave) {
     message.increment = 5;
     message.distances.fill(65535);
     message.distances[3] = 250;
-    bench.link().offer(FrameObstacles{message, {}, {}}, {bench.now().nanoseconds - 250 * kMillisecond});
+    bench.link().offer(with(message), {bench.now().nanoseconds - 250 * kMillisecond});
     bench.run(0.01);
     ASSERT_EQ(bench.sectors.size(), 1U);
     const auto found =
@@ -278,7 +283,7 @@ TEST(AutopilotLink, SectorsAreTurnedToTheHeadingAtWhichTheyLeave) {
 TEST(AutopilotLink, SectorsThatSayNothingAreNotSentAndThatIsSaid) {
   Bench bench;
   bench.run(5);
-  bench.link().offer(std::nullopt, bench.now());
+  bench.link().offer(FrameObstacles{}, bench.now());
   bench.run(1);
   EXPECT_TRUE(bench.sectors.empty());
   EXPECT_EQ(bench.link().report().missing, Missing::view);
@@ -289,7 +294,7 @@ TEST(AutopilotLink, IsNotActiveWhileItsSectorsAreTooOldToBeSent) {
   Bench bench;
   bench.run(5);
   for (int i = 0; i < 20; ++i) {
-    bench.link().offer(FrameObstacles{}, {bench.now().nanoseconds - 350 * kMillisecond});
+    bench.link().offer(with(mavlink::ObstacleDistance{}), {bench.now().nanoseconds - 350 * kMillisecond});
     bench.run(0.1);
   }
   EXPECT_EQ(bench.link().report().missing, Missing::late);
@@ -332,7 +337,7 @@ TEST(AutopilotLink, PointsAreThoseOfWhereTheVehicleIsByNow) {
     bench.kind = ardupilot_kind;
     bench.turn_rate = degrees * std::numbers::pi / 180;
     bench.run(5);
-    bench.link().offer(FrameObstacles{{}, {Eigen::Vector3d(5, 0, 0), Eigen::Vector3d(6, 0, 4)}, {}},
+    bench.link().offer(with({}, {{Eigen::Vector3d(5, 0, 0), Eigen::Vector3d(6, 0, 4)}}),
                        {bench.now().nanoseconds - 250 * kMillisecond});
     bench.run(0.01);
     EXPECT_TRUE(bench.sectors.empty());
@@ -355,12 +360,30 @@ TEST(AutopilotLink, PointsAreThoseOfWhereTheVehicleIsByNow) {
   }
 }
 
+/// A camera that looks down sees nothing at the vehicle's height, and points all the same.
+TEST(AutopilotLink, PointsNeedNoSectors) {
+  LinkOptions options;
+  options.obstacles = ObstacleMessages::faces;
+  for (const std::uint8_t kind : {ardupilot_kind, px4_kind}) {
+    Bench bench(options);
+    bench.kind = kind;
+    bench.run(5);
+    bench.link().offer(with({}, {{Eigen::Vector3d(3, 0, -3)}}), bench.now());
+    bench.run(0.2);
+    EXPECT_EQ(bench.points.size(), kind == ardupilot_kind ? 2U : 0U);
+    EXPECT_TRUE(bench.sectors.empty());
+    if (kind == px4_kind) {
+      EXPECT_EQ(bench.link().report().missing, Missing::view);
+    }
+  }
+}
+
 TEST(AutopilotLink, PointsThatAnAutopilotDoesNotKnowAreSentAsDistancesAndThatIsSaid) {
   LinkOptions options;
   options.obstacles = ObstacleMessages::faces;
   Bench bench(options);
   bench.run(5);
-  bench.link().offer(FrameObstacles{{}, {Eigen::Vector3d(5, 0, 0)}, {}}, bench.now());
+  bench.link().offer(with(mavlink::ObstacleDistance{}, {{Eigen::Vector3d(5, 0, 0)}}), bench.now());
   bench.run(0.1);
   EXPECT_TRUE(bench.points.empty());
   EXPECT_EQ(bench.sectors.size(), 1U);

@@ -238,12 +238,22 @@ TEST(FilteredPoses, BeginAnewWhereTheAutopilotDoes) {
   EXPECT_EQ(poses.at(after.time_of(19)).kind, PoseAnswer::Kind::never);
 }
 
+/// At rest and without a magnetometer everything is there but the heading.
+TEST(FilteredPoses, OfAVehicleAtRestLackTheHeading) {
+  SensorStream autopilot;
+  Listening poses;
+  autopilot.send(poses, 0, 3.9);  // it stands until 4 s
+  EXPECT_EQ(poses.missing(), heading_unknown);
+  EXPECT_EQ(poses.newest(), Time{});
+  EXPECT_THAT(poses.summary(), HasSubstr("no vertical velocity"));
+}
+
 TEST(FilteredPoses, SayWhatIsMissing) {
   SensorStream autopilot;
   Listening poses;
   EXPECT_EQ(poses.missing(), "no IMU message");
   for (std::size_t i = 0; i < 60; i += 20) autopilot.give(poses, autopilot.highres(i));
-  EXPECT_THAT(poses.missing(), HasSubstr("IMU at 5 Hz, 20 wanted"));
+  EXPECT_THAT(poses.missing(), HasSubstr("slower than 20 Hz"));
   Listening blind;
   autopilot.with_gnss = false;
   autopilot.send(blind, 0, 3);

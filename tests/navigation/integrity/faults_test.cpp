@@ -236,5 +236,29 @@ TEST(IntegrityInFlight, AClimbThatTheVelocitiesDoNotMeasureIsNoFault) {
   EXPECT_GT(outcome.noticed, 1e8) << "navigating all the time";
 }
 
+/// A filter that starts in a smooth cruise, with velocities that have no climb: that is no rest.
+TEST(IntegrityInFlight, ACruiseIsNotTakenForRest) {
+  simulation::Imu imu(simulation::ImuModel::industrial(), 3);
+  simulation::Gnss gnss(simulation::GnssModel::single_point(), 4);
+  Navigator navigator(NavigatorOptions{});
+  for (int i = 0; i < 200 * 15; ++i) {
+    simulation::KinematicState state;
+    state.time = at(i / 200.0);
+    state.R_world_body = Eigen::AngleAxisd(0.4, Vector3d::UnitZ());
+    state.velocity = Vector3d(12, 9, 0);
+    state.position = i / 200.0 * state.velocity;
+    navigator.add(imu.sample(state));
+    if (i % 40 != 0) continue;
+    auto epoch = gnss.sample(state);
+    epoch.velocity.covariance(2, 2) = 100;
+    navigator.add(epoch.fix);
+    navigator.add(epoch.velocity);
+    const AbsolutePose pose = navigator.absolute_pose(state.time);
+    if (pose.answer != Answer::valid) continue;
+    EXPECT_GT(pose.velocity.norm(), 10) << state.time.seconds();
+  }
+  EXPECT_EQ(navigator.health().times_lost, 0U);
+}
+
 }  // namespace
 }  // namespace pade::navigation

@@ -134,6 +134,14 @@ TEST(GnssAgreement, OfWhatIsNotMeasuredNothingIsSaid) {
     }
     EXPECT_EQ(contradicts, aside > 0);
   }
+  // What says nothing at all does not agree either.
+  GnssAgreement silent;
+  for (int i = 0; i < 5 * 30; ++i) {
+    silent.velocity(Vector3d(7, 7, 7), Vector3d::Zero(), at(0.2 * i));
+    silent.position(Vector3d::Zero(), Vector3d::Constant(0.25), Vector3d::Constant(0.13), at(0.2 * i));
+    ASSERT_FALSE(silent.contradicts());
+    ASSERT_EQ(silent.agreed(at(0.2 * i)), 0);
+  }
   // The climb is measured from some moment on: what was before is no evidence.
   GnssAgreement agreement;
   for (int i = 0; i < 5 * 90; ++i) {

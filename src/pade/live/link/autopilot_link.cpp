@@ -153,8 +153,8 @@ void AutopilotLink::ask_for(const WantedMessage& message) {
 
 /// The sectors are those of the exposure, the receiver takes them for those of now. Whole bins: between them
 /// the rule that no obstacle is lost would not hold.
-void AutopilotLink::turn_to_newest_heading(mavlink::ObstacleDistance& sectors, Time frame) const {
-  const auto theirs = clock_.to_autopilot(frame);
+void AutopilotLink::turn_to_newest_heading(mavlink::ObstacleDistance& sectors) const {
+  const auto theirs = offered_pose_time();
   if (!theirs || sectors.increment == 0) return;
   constexpr double kDegrees = 180 / std::numbers::pi;
   const auto bins =
@@ -164,39 +164,48 @@ void AutopilotLink::turn_to_newest_heading(mavlink::ObstacleDistance& sectors, T
               sectors.distances.end());
 }
 
+bool AutopilotLink::in_faces() const {
+  return options_.obstacles == ObstacleMessages::faces && report_.autopilot &&
+         report_.autopilot->kind == ardupilot_kind;
+}
+
+std::optional<Time> AutopilotLink::offered_pose_time() const {
+  return clock_.to_autopilot(later(offered_frame_, offered_ ? offered_->time_offset : 0));
+}
+
 bool AutopilotLink::send_level() {
-  turn_to_newest_heading(offered_->level, offered_frame_);
-  return send(offered_->level);
+  turn_to_newest_heading(*offered_->level);
+  return send(*offered_->level);
 }
 
 /// As seen from where the vehicle is by now.
 bool AutopilotLink::send_points() {
-  const auto theirs = clock_.to_autopilot(offered_frame_);
+  const auto theirs = offered_pose_time();
   if (!theirs) return false;
+  std::vector<Eigen::Vector3d>& points = *offered_->points;
   const PoseAnswer then = poses_->at(*theirs);
   const PoseAnswer now = poses_->at(poses_->newest());
   if (then.kind == PoseAnswer::Kind::valid && now.kind == PoseAnswer::Kind::valid &&
       then.jumps == now.jumps) {
     const Pose T_now_then = now.T_world_body.inverse() * then.T_world_body;
-    for (Eigen::Vector3d& point : offered_->points) point = T_now_then * point;
+    for (Eigen::Vector3d& point : points) point = T_now_then * point;
   }
   // Each frame has two stamps of its own.
   auto stamp = static_cast<std::uint32_t>(theirs->nanoseconds / 1'000'000);
   if (stamp - last_stamp_ < 2 || last_stamp_ - stamp < 2) stamp = last_stamp_ + 2;
   last_stamp_ = stamp;
   bool sent = true;
-  for (const auto& message : obstacle_messages(offered_->points, stamp, offered_->options))
+  for (const auto& message : obstacle_messages(points, stamp, offered_->options))
     sent = send(message) && sent;
   return sent;
 }
 
 void AutopilotLink::send_sectors(Time now) {
   if (!offered_) return;
-  const bool in_faces = options_.obstacles == ObstacleMessages::faces;
-  report_.level_instead = in_faces && report_.autopilot->kind != ardupilot_kind;
+  report_.level_instead = options_.obstacles == ObstacleMessages::faces && !in_faces();
   if (seconds_between(offered_frame_, now) > kOldest) {
     ++report_.sectors_stale;
-  } else if (in_faces && !report_.level_instead ? send_points() : send_level()) {
+  } else if (in_faces() && offered_->points ? send_points() : offered_->level && send_level()) {
     ++report_.sectors_sent;
     progress_.sent = offered_frame_.nanoseconds;
   }
@@ -215,9 +224,9 @@ void AutopilotLink::send_health(Time now, const Progress& progress) {
   const bool changed = missing != report_.missing;
   report_.missing = missing;
   report_.poses_missing = missing == Missing::pose ? poses_->missing() : std::string();
-  if (said_ != missing && now >= next_text_) {
-    say(missing == Missing::nothing ? kInformation : kWarning, text_of(report_));
-    said_ = missing;
+  if (const std::string text = text_of(report_); said_ != text && now >= next_text_) {
+    say(missing == Missing::nothing ? kInformation : kWarning, text);
+    said_ = text;
     next_text_ = later(now, kBetweenTexts);
   }
   if (changed) next_heartbeat_ = earliest_heartbeat_;
@@ -257,11 +266,13 @@ std::optional<Matrix6d> AutopilotLink::motion_covariance(Time t1, Time t2, const
   return poses_->motion_covariance(*theirs1, *theirs2, T_body_camera);
 }
 
-void AutopilotLink::offer(const std::optional<FrameObstacles>& obstacles, Time frame) {
+void AutopilotLink::offer(const FrameObstacles& obstacles, Time frame) {
   const std::lock_guard lock(mutex_);
-  offered_ = obstacles;
+  const bool says_anything = obstacles.level || (in_faces() && obstacles.points);
+  offered_.reset();
+  if (says_anything) offered_ = obstacles;
   offered_frame_ = frame;
-  (obstacles ? progress_.offered : progress_.empty) = frame.nanoseconds;
+  (says_anything ? progress_.offered : progress_.empty) = frame.nanoseconds;
 }
 
 void AutopilotLink::refresh_report(Time now) {

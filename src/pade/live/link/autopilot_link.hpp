@@ -89,9 +89,10 @@ std::string text_of(const LinkReport& report);
 
 /// The obstacles of a frame.
 struct FrameObstacles {
-  mavlink::ObstacleDistance level;
-  std::vector<Eigen::Vector3d> points;  ///< obstacle_points(), if they are to be sent as such
-  SectorOptions options;                ///< their limits
+  std::optional<mavlink::ObstacleDistance> level;      ///< empty: nothing could be said of any sector
+  std::optional<std::vector<Eigen::Vector3d>> points;  ///< obstacle_points(), if they are to be sent as such
+  SectorOptions options;                               ///< their limits
+  double time_offset = 0;                              ///< time of the pose = time of the frame + this, s
 };
 
 /// One for each autopilot. step() belongs to one thread, all else to any.
@@ -110,9 +111,9 @@ class AutopilotLink : public NavigationSource {
   [[nodiscard]] std::optional<Matrix6d> motion_covariance(Time t1, Time t2,
                                                           const Pose& T_body_camera) const override;
   /// Obstacles of a frame, sent at the next step unless they are older than 0.3 s by then; those before them
-  /// that were not sent are forgotten. None: nothing could be said of any sector, and nothing is sent, since
-  /// receivers would take it for a sign of health.
-  void offer(const std::optional<FrameObstacles>& obstacles, Time frame);
+  /// that were not sent are forgotten. Those that say nothing are not sent, since receivers would take them
+  /// for a sign of health.
+  void offer(const FrameObstacles& obstacles, Time frame);
   /// Says that there will be no more sectors. To be called when nobody calls step() any more.
   void end();
   [[nodiscard]] LinkReport report() const;
@@ -125,7 +126,10 @@ class AutopilotLink : public NavigationSource {
   void ask_for(const WantedMessage& message);
   bool send_level();
   bool send_points();
-  void turn_to_newest_heading(mavlink::ObstacleDistance& sectors, Time frame) const;
+  void turn_to_newest_heading(mavlink::ObstacleDistance& sectors) const;
+  [[nodiscard]] bool in_faces() const;
+  /// Of the autopilot's clock, of the poses of the frame that is offered.
+  [[nodiscard]] std::optional<Time> offered_pose_time() const;
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);
   void send_heartbeat(std::uint8_t state);
@@ -139,7 +143,7 @@ class AutopilotLink : public NavigationSource {
   mavlink::Sender sender_;
   Time next_question_, next_request_, next_heartbeat_, next_text_, earliest_heartbeat_;
   Time heard_;                        // the autopilot's heartbeat, last
-  std::optional<Missing> said_;       // in the last text
+  std::string said_;                  // in the last text
   std::vector<WantedMessage> asked_;  // how many had come when the streams were last asked for
   std::uint32_t last_stamp_ = 0;      // of points, ms
 

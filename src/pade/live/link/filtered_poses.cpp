@@ -123,6 +123,7 @@ std::optional<Matrix6d> FilteredPoses::motion_covariance(Time t1, Time t2, const
 }
 
 Time FilteredPoses::newest() {
+  if (navigator_.health().status == NavigationStatus::lost) return {};
   const Time newest = navigator_.newest();
   return navigator_.absolute_pose(newest).answer == Answer::valid ? newest : Time{};
 }
@@ -143,17 +144,12 @@ double FilteredPoses::imu_rate() const {
 std::string FilteredPoses::missing() {
   if (imu_samples_ == 0)
     return sensors_ && sensors_->unitless() > 0 ? "RAW_IMU has no units" : "no IMU message";
-  if (const double rate = imu_rate(); rate > 0 && rate < slowest_imu)
-    return fmt::format("IMU at {:.3g} Hz, {} wanted", rate, slowest_imu);
+  if (const double rate = imu_rate(); rate > 0 && rate < slowest_imu) return "the IMU is slower than 20 Hz";
   if (fixes_ == 0) return "no GNSS fix";
-  switch (navigator_.health().status) {
-    case NavigationStatus::uninitialised:
-      return "the filter is starting";
-    case NavigationStatus::lost:
-      return "the filter is lost";
-    default:
-      return {};
-  }
+  const NavigationStatus status = navigator_.health().status;
+  if (status == NavigationStatus::lost) return "the filter is lost";
+  if (newest().nanoseconds != 0) return {};
+  return status == NavigationStatus::uninitialised ? "the filter is starting" : std::string(heading_unknown);
 }
 
 std::vector<WantedMessage> FilteredPoses::wanted(double /*pose_rate*/) const {
@@ -169,8 +165,10 @@ std::vector<WantedMessage> FilteredPoses::wanted(double /*pose_rate*/) const {
 }
 
 std::string FilteredPoses::summary() {
-  return fmt::format("{} samples of the IMU at {:.0f} Hz, {} fixes, {} heights; {}", imu_samples_, imu_rate(),
-                     fixes_, heights_, to_name(navigator_.health().status));
+  std::string text = fmt::format("{} samples of the IMU at {:.0f} Hz, {} fixes, {} heights; {}", imu_samples_,
+                                 imu_rate(), fixes_, heights_, to_name(navigator_.health().status));
+  for (const std::string& remark : remarks_) text += fmt::format("; {}", remark);
+  return text;
 }
 
 }  // namespace pade::live

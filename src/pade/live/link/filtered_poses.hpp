@@ -15,6 +15,10 @@
 
 namespace pade::live {
 
+/// Why there is no pose yet of a vehicle at rest without a magnetometer: only motion shows where its nose
+/// points.
+inline constexpr std::string_view heading_unknown = "the heading is not known yet";
+
 /// The GPS/INS filter on IMU, GNSS, magnetometer and barometer of an autopilot's messages (SensorGatherer
 /// says which). The world is east, north, up of the first fix. All times are the autopilot's, since its
 /// start.
@@ -42,8 +46,8 @@ class FilteredPoses : public PoseSource {
   [[nodiscard]] std::size_t fixes() const { return fixes_; }
   /// By the last two seconds, Hz.
   [[nodiscard]] double imu_rate() const;
-  /// "no IMU message", "IMU at 4 Hz, 20 wanted", "no GNSS fix", "the filter is starting", "the filter is
-  /// lost".
+  /// "no IMU message", "the IMU is slower than 20 Hz", "no GNSS fix", "the filter is starting",
+  /// `heading_unknown`, "the filter is lost".
   [[nodiscard]] std::string missing() override;
   [[nodiscard]] std::string summary() override;
   [[nodiscard]] navigation::Health health() { return navigator_.health(); }

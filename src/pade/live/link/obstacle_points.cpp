@@ -213,7 +213,7 @@ std::vector<mavlink::ObstacleDistance3d> obstacle_messages(std::span<const Vecto
                                                            const SectorOptions& options) {
   std::array<const Vector3d*, 40> nearest{};
   for (const Vector3d& point : points) {
-    if (point.norm() > options.max_distance) continue;
+    if (point.norm() > options.max_distance || point.isZero(1e-6)) continue;
     const Vector3d*& known = nearest[face_of(Direction::of(point))];
     if (known == nullptr || point.squaredNorm() < known->squaredNorm()) known = &point;
   }

@@ -87,6 +87,11 @@ void GnssAgreement::velocity(const Vector3d& measured, const Vector3d& axes, Tim
 void GnssAgreement::position(const Vector3d& measured, const Vector3d& white, const Vector3d& walk,
                              Time now) {
   if (!has_velocity_) return;
+  if (axes_.isZero(0)) {  // nothing is said, so nothing agrees either
+    positions_ = 0;
+    ratio_ = 0;
+    return;
+  }
   const Vector3d apart = axes_.cwiseProduct(measured - way_ - seconds_between(time_, now) * velocity_);
   const double dt = positions_ > 0 ? seconds_between(position_time_, now) : 0;
   position_time_ = now;

@@ -118,13 +118,17 @@ void check_upright(const std::vector<ImuSample>& imu, std::vector<Hint>& hints) 
       "+9.8 upwards)");
 }
 
-/// Without the axes in which some velocity is not measured: neither velocities nor positions have any way
-/// there.
+/// Without the axes that most velocities do not measure, where positions then have no way either, and without
+/// the velocities that do not measure the others.
 GnssLog measured_part(const GnssLog& gnss) {
-  Vector3d axes = Vector3d::Ones();
-  for (const GnssVelocity& velocity : gnss.velocities) axes = axes.cwiseProduct(measured_axes(velocity));
+  Vector3d measured = Vector3d::Zero();
+  for (const GnssVelocity& velocity : gnss.velocities) measured += measured_axes(velocity);
+  const Vector3d axes = (measured.array() > 0.5 * static_cast<double>(gnss.velocities.size())).cast<double>();
   GnssLog part = gnss;
-  if (axes == Vector3d::Ones()) return part;
+  std::erase_if(part.velocities, [&](const GnssVelocity& velocity) {
+    return (axes - measured_axes(velocity)).maxCoeff() > 0;
+  });
+  if (gnss.velocities.empty() || axes == Vector3d::Ones()) return part;
   for (GnssFix& fix : part.fixes) fix.position = fix.position.cwiseProduct(axes).eval();
   for (GnssVelocity& velocity : part.velocities)
     velocity.velocity = velocity.velocity.cwiseProduct(axes).eval();
