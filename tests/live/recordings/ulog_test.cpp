@@ -29,21 +29,29 @@ class UlogBytes {
   UlogBytes() : text_("ULog\x01\x12\x35\x01") { text_ += std::string(8, '\0'); }
   void add(char type, const std::string& content) {
     const auto size = static_cast<std::uint16_t>(content.size());
-    text_ += of(size) + type + content;
+    text_ += of(size);
+    text_ += type;
+    text_ += content;
   }
   template <class T>
   static std::string of(T value) {
     return {reinterpret_cast<const char*>(&value), sizeof(T)};
+  }
+  template <class... Parts>
+  static std::string joined(const Parts&... parts) {
+    std::string all;
+    (all.append(parts), ...);
+    return all;
   }
   void add_imu() {
     add('F', "vector:float[2] xy;double z;");
     add('F',
         "sensor_combined:uint64_t timestamp;vector inner;float[3] gyro_rad;int8_t odd;"
         "float[3] accelerometer_m_s2;uint8_t[7] _padding0;");
-    add('A', of<std::uint8_t>(0) + of<std::uint16_t>(513) + "sensor_combined");
+    add('A', joined(of<std::uint8_t>(0), of<std::uint16_t>(513), "sensor_combined"));
     for (int i = 0; i < 100; ++i) {
-      add('D', of<std::uint16_t>(513) + of<std::uint64_t>(5'000'000 + 4000 * i) + std::string(16, 'x') +
-                   of(0.1F) + of(0.2F) + of(0.3F) + of<std::int8_t>(-3) + of(1.0F) + of(2.0F) + of(-9.0F));
+      add('D', joined(of<std::uint16_t>(513), of<std::uint64_t>(5'000'000 + 4000 * i), std::string(16, 'x'),
+                      of(0.1F), of(0.2F), of(0.3F), of<std::int8_t>(-3), of(1.0F), of(2.0F), of(-9.0F)));
     }
   }
   void add_gps() {
@@ -51,12 +59,12 @@ class UlogBytes {
         "sensor_gps:uint64_t timestamp;uint64_t timestamp_sample;double latitude_deg;double longitude_deg;"
         "double altitude_msl_m;float eph;float epv;float s_variance_m_s;float vel_n_m_s;float vel_e_m_s;"
         "float vel_d_m_s;uint8_t fix_type;bool vel_ned_valid;");
-    add('A', of<std::uint8_t>(0) + of<std::uint16_t>(7) + "sensor_gps");
+    add('A', joined(of<std::uint8_t>(0), of<std::uint16_t>(7), "sensor_gps"));
     for (int i = 0; i < 3; ++i) {
-      add('D', of<std::uint16_t>(7) + of<std::uint64_t>(5'100'000 + 200'000 * i) +
-                   of<std::uint64_t>(5'000'000 + 200'000 * i) + of(47.0) + of(8.0) + of(400.0 + i) +
-                   of(0.5F) + of(0.8F) + of(0.1F) + of(1.0F) + of(2.0F) + of(-3.0F) + of<std::uint8_t>(3) +
-                   of<std::uint8_t>(1));
+      add('D', joined(of<std::uint16_t>(7), of<std::uint64_t>(5'100'000 + 200'000 * i),
+                      of<std::uint64_t>(5'000'000 + 200'000 * i), of(47.0), of(8.0), of(400.0 + i), of(0.5F),
+                      of(0.8F), of(0.1F), of(1.0F), of(2.0F), of(-3.0F), of<std::uint8_t>(3),
+                      of<std::uint8_t>(1)));
     }
   }
   [[nodiscard]] const std::string& text() const { return text_; }
