@@ -241,6 +241,7 @@ TEST(IntegrityInFlight, ACruiseIsNotTakenForRest) {
   simulation::Imu imu(simulation::ImuModel::industrial(), 3);
   simulation::Gnss gnss(simulation::GnssModel::single_point(), 4);
   Navigator navigator(NavigatorOptions{});
+  int answers = 0;
   for (int i = 0; i < 200 * 15; ++i) {
     simulation::KinematicState state;
     state.time = at(i / 200.0);
@@ -248,6 +249,10 @@ TEST(IntegrityInFlight, ACruiseIsNotTakenForRest) {
     state.velocity = Vector3d(12, 9, 0);
     state.position = i / 200.0 * state.velocity;
     navigator.add(imu.sample(state));
+    if (i % 10 == 0) {
+      const Vector3d field(0, 0.2, -0.4);
+      navigator.add(MagneticField{state.time, state.R_world_body.conjugate() * field, 0.02});
+    }
     if (i % 40 != 0) continue;
     auto epoch = gnss.sample(state);
     epoch.velocity.covariance(2, 2) = 100;
@@ -255,8 +260,10 @@ TEST(IntegrityInFlight, ACruiseIsNotTakenForRest) {
     navigator.add(epoch.velocity);
     const AbsolutePose pose = navigator.absolute_pose(state.time);
     if (pose.answer != Answer::valid) continue;
+    ++answers;
     EXPECT_GT(pose.velocity.norm(), 10) << state.time.seconds();
   }
+  EXPECT_GT(answers, 20);
   EXPECT_EQ(navigator.health().times_lost, 0U);
 }
 
