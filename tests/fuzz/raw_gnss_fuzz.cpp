@@ -1,7 +1,9 @@
 // Any text is either refused or gives raw GNSS that can be played: no state, position or residual that is
 // used is other than finite. One target for each reader: PADE_READER is its name, set by the build.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "pade/io/gnss/raw_gnss_files.hpp"
@@ -59,9 +61,36 @@ void navigation(std::string_view text) {
   play(log);
 }
 
+/// The bytes as messages with the right marks and checksums, which no fuzzer gets past by chance: a kind, two
+/// bytes of length, and the payload, again and again.
+std::string framed(std::string_view text) {
+  std::string stream;
+  while (text.size() >= 3) {
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+    const std::size_t length = std::min<std::size_t>(byte(1) + 256U * (byte(2) % 8U), text.size() - 3);
+    std::string body = {'\x02', byte(0) % 2 == 0 ? '\x15' : '\x13'};  // RXM-RAWX, RXM-SFRBX
+    body += static_cast<char>(length & 255U);
+    body += static_cast<char>(length >> 8U);
+    body += text.substr(3, length);
+    unsigned char a = 0, b = 0;
+    for (const char c : body) {
+      a = static_cast<unsigned char>(a + static_cast<unsigned char>(c));
+      b = static_cast<unsigned char>(b + a);
+    }
+    stream += "\xb5\x62";
+    stream += body;
+    stream += static_cast<char>(a);
+    stream += static_cast<char>(b);
+    text.remove_prefix(3 + length);
+  }
+  return stream;
+}
+
 void ubx(std::string_view text) {
-  RawLog log;
-  if (pade::io::parse_ubx(text, "ubx", log)) play(log);
+  for (const std::string& bytes : {std::string(text), framed(text)}) {
+    RawLog log;
+    if (pade::io::parse_ubx(bytes, "ubx", log)) play(log);
+  }
 }
 
 void known_ranges(std::string_view text) {

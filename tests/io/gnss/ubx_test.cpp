@@ -37,10 +37,10 @@ struct Measured {
   std::uint8_t tracked;
 };
 
-std::string rawx(double of_week, const std::vector<Measured>& all) {
+std::string rawx(double of_week, const std::vector<Measured>& all, std::uint16_t week = 2268) {
   std::string p;
   append(p, of_week);
-  append(p, std::uint16_t{2268});
+  append(p, week);
   append(p, std::int8_t{18});
   append(p, static_cast<std::uint8_t>(all.size()));
   append(p, std::uint32_t{0x0101});
@@ -149,6 +149,19 @@ TEST(Ubx, AShorterLockTimeIsALoss) {
       rawx(1, {{0, 8, 0, 900, 7}}) + rawx(2, {{0, 8, 0, 1900, 7}}) + rawx(3, {{0, 8, 0, 400, 7}}), "a", log));
   EXPECT_FALSE(log.epochs[1].signals[0].lost_lock);
   EXPECT_TRUE(log.epochs[2].signals[0].lost_lock);
+}
+
+/// A checksum says nothing of the sense: found by fuzzing, where a time did not fit into its nanoseconds.
+TEST(Ubx, AWeekThatIsNotOfThisCenturyIsNamedAndLeftOut) {
+  gnss::RawLog log;
+  const std::vector<Measured> one{{0, 8, 0, 900, 7}};
+  ASSERT_TRUE(parse_ubx(rawx(1, one) + rawx(2, one, 59'669) + rawx(3, one, 65'535) + rawx(4, one, 7000),
+                        "a.ubx", log));
+  ASSERT_EQ(log.epochs.size(), 2U);
+  EXPECT_GT(log.epochs[1].time, log.epochs[0].time);
+  ASSERT_FALSE(log.remarks.empty());
+  EXPECT_THAT(log.remarks[0], HasSubstr("week 59669"));
+  EXPECT_THAT(log.remarks[0], HasSubstr("before 2115"));
 }
 
 TEST(Ubx, ABrokenChecksumIsNamedAndSurvived) {

@@ -130,14 +130,18 @@ class Log {
   void read_measurements(const Payload& p, std::size_t at) {
     const std::size_t count = p.size() >= kRawxHeader ? p.byte(11) : 0;
     const double of_week = p.size() >= kRawxHeader ? p.real8(0) : -1;
-    if (p.size() < kRawxHeader + count * kMeasurement || !(of_week >= 0 && of_week < 604801)) {
+    const std::size_t week = p.size() >= kRawxHeader ? p.whole(8, 2) : 0;
+    constexpr std::size_t kLastWeek = 7000;  // of the year 2114
+    if (p.size() < kRawxHeader + count * kMeasurement || !(of_week >= 0 && of_week < 604801) ||
+        week > kLastWeek) {
       misread_.add(fmt::format(
-          "{}: RXM-RAWX at byte {} has {} bytes and time of week {}, expected {} bytes; it is left out",
-          name_, at, p.size(), of_week, kRawxHeader + count * kMeasurement));
+          "{}: RXM-RAWX at byte {} has {} bytes, week {} and time of week {}, expected {} bytes and a time "
+          "before 2115; it is left out",
+          name_, at, p.size(), week, of_week, kRawxHeader + count * kMeasurement));
       return;
     }
     gnss::Epoch epoch;
-    epoch.time.nanoseconds = static_cast<std::int64_t>(p.whole(8, 2)) * kWeekOfNanoseconds +
+    epoch.time.nanoseconds = static_cast<std::int64_t>(week) * kWeekOfNanoseconds +
                              static_cast<std::int64_t>(std::llround(of_week * 1e9));
     for (std::size_t i = 0; i < count; ++i) add_signal(p, kRawxHeader + i * kMeasurement, epoch);
     if (!log_.epochs.empty() && epoch.time <= log_.epochs.back().time) {

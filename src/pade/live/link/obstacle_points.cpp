@@ -74,12 +74,8 @@ class Cells {
     return static_cast<int>(std::floor(elevation / std::numbers::pi * kCellElevations)) + kCellElevations / 2;
   }
   /// Of the middle of column i, rad.
-  static double bearing_of(int i) {
-    return 2 * std::numbers::pi * (i + 0.5 - kCellBearings / 2) / kCellBearings;
-  }
-  static double elevation_of(int j) {
-    return std::numbers::pi * (j + 0.5 - kCellElevations / 2) / kCellElevations;
-  }
+  static double bearing_of(int i) { return 2 * std::numbers::pi * ((i + 0.5) / kCellBearings - 0.5); }
+  static double elevation_of(int j) { return std::numbers::pi * ((j + 0.5) / kCellElevations - 0.5); }
 
   std::array<double, static_cast<std::size_t>(kCellBearings* kCellElevations)> nearest_{};
   std::array<Direction, static_cast<std::size_t>(kCellBearings* kCellElevations)> where_{};
@@ -219,7 +215,7 @@ std::vector<mavlink::ObstacleDistance3d> obstacle_messages(std::span<const Vecto
   }
   std::vector<Vector3d> sent;
   for (const Vector3d* point : nearest) {
-    if (point != nullptr) sent.push_back(std::max(1.0, options.min_distance / point->norm()) * *point);
+    if (point != nullptr) sent.emplace_back(std::max(1.0, options.min_distance / point->norm()) * *point);
   }
   if (sent.empty()) sent.emplace_back(options.max_distance + 1, 0, 0);
   std::vector<mavlink::ObstacleDistance3d> messages;
