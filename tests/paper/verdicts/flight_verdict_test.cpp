@@ -54,12 +54,14 @@ TEST(FlightVerdict, ReadsTheGridAndGoesThroughAPlan) {
   const std::string grid =
       R"([{"configuration":"chain","world":"forest","totals":{"flights":40,"arrived":{"flights":39},"collided":{"flights":1}}},
           {"configuration":"chain","world":"all","totals":{"flights":100,"arrived":{"flights":98},"collided":{"flights":1}}},
+          {"configuration":"straight","world":"all","totals":{"flights":100,"arrived":{"flights":9},"collided":{"flights":91}}},
           {"configuration":"density-200","world":"forest","totals":{"flights":20,"arrived":{"flights":20},"collided":{"flights":0}}}])";
   const auto read = flights_of_grid(grid, "grid.json");
   ASSERT_TRUE(read.ok()) << read.error().message;
-  const std::vector<FlownFlights> flights{{"chain", 100, 98, 1}, {"density-200", 20, 20, 0}};
+  const std::vector<FlownFlights> flights{
+      {"chain", 100, 98, 1}, {"straight", 100, 9, 91}, {"density-200", 20, 20, 0}};
   EXPECT_EQ(*read, flights);
-  EXPECT_EQ(text_of(flights), "chain:100:98:1,density-200:20:20:0");
+  EXPECT_EQ(text_of(flights), "chain:100:98:1,straight:100:9:91,density-200:20:20:0");
   EXPECT_EQ(flights_from_text(text_of(flights)).value(), flights);
   EXPECT_TRUE(flights_from_text("").value().empty());
 }
@@ -74,7 +76,13 @@ TEST(FlightVerdict, RefusesWhatIsNoGrid) {
       R"([{"configuration":"chain","world":"all","totals":{"flights":3,"arrived":{"flights":3},"collided":{"flights":1}}}])",
       "some.json");
   ASSERT_FALSE(more.ok());
-  EXPECT_THAT(more.error().message, HasSubstr("found 3 arrived and 1 collided"));
+  EXPECT_THAT(more.error().message, HasSubstr("found 3 arrived and 1 collided of 3 flights"));
+  const auto wrapped = flights_of_grid(
+      R"([{"configuration":"chain","world":"all","totals":{"flights":3,"arrived":{"flights":-1},"collided":{"flights":1}}}])",
+      "some.json");
+  ASSERT_FALSE(wrapped.ok());
+  EXPECT_THAT(wrapped.error().message, HasSubstr("counts that fit together"));
+  EXPECT_THAT(flights_of_grid("[]", "some.json").error().message, HasSubstr("found flights of nothing"));
   for (const char* text :
        {"chain", "chain:1:1", "chain:1:1:1", ":1:1:0", "chain:1:x:0", "chain:3:1:1:", "chain:-1:0:0"})
     EXPECT_FALSE(flights_from_text(text).ok()) << text;

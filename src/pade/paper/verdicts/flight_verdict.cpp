@@ -41,16 +41,25 @@ std::string sentence(std::string_view name, const FlownFlights& f) {
                      text(f.arrived, arrivals(f)), text(f.collided, collisions(f)));
 }
 
+bool is_possible(const FlownFlights& f) {
+  return f.arrived <= f.flights && f.collided <= f.flights - f.arrived;
+}
+
 Result<FlownFlights> flights_of_row(const Json& row, std::string_view file) {
   const Json& totals = row.at("totals");
+  const Json &flights = totals.at("flights"), &arrived = totals.at("arrived").at("flights"),
+             &collided = totals.at("collided").at("flights");
   FlownFlights f;
   f.configuration = row.at("configuration").get<std::string>();
-  f.flights = totals.at("flights").get<std::size_t>();
-  f.arrived = totals.at("arrived").at("flights").get<std::size_t>();
-  f.collided = totals.at("collided").at("flights").get<std::size_t>();
-  if (f.arrived + f.collided > f.flights)
-    return Error{fmt::format("{}: {}: found {} arrived and {} collided, expected at most {} flights", file,
-                             f.configuration, f.arrived, f.collided, f.flights)};
+  const bool counts =
+      flights.is_number_unsigned() && arrived.is_number_unsigned() && collided.is_number_unsigned();
+  if (counts)
+    f = {f.configuration, flights.get<std::size_t>(), arrived.get<std::size_t>(),
+         collided.get<std::size_t>()};
+  if (!counts || !is_possible(f))
+    return Error{fmt::format(
+        "{}: {}: found {} arrived and {} collided of {} flights, expected counts that fit together", file,
+        f.configuration, arrived.dump(), collided.dump(), flights.dump())};
   return f;
 }
 
@@ -73,6 +82,13 @@ Result<std::vector<FlownFlights>> flights_of_grid(std::string_view json, std::st
   } catch (const Json::exception& error) {
     return Error{
         fmt::format("{}: found {}, expected the grid.json of `pade experiment fly`", file, error.what())};
+  }
+  if (find_flown(all, "chain") == nullptr || find_flown(all, "straight") == nullptr) {
+    std::string names;
+    for (const FlownFlights& f : all)
+      names += fmt::format("{}{}", names.empty() ? "" : ", ", f.configuration);
+    return Error{fmt::format("{}: found flights of {}, expected those of chain and straight among them", file,
+                             names.empty() ? "nothing" : names)};
   }
   return all;
 }
@@ -103,7 +119,7 @@ Result<std::vector<FlownFlights>> flights_from_text(std::string_view text) {
       one = one.substr(0, colon);
     }
     f.configuration = one;
-    if (one.empty() || f.arrived + f.collided > f.flights) return malformed;
+    if (one.empty() || !is_possible(f)) return malformed;
     all.push_back(std::move(f));
   }
   return all;

@@ -23,7 +23,8 @@ struct FlownFlights {
 };
 
 /// The configurations that grid.json of `pade experiment fly` has, each in all of its worlds.
-/// @param file  for the errors: what is not such a file, or counts more arrivals and collisions than flights
+/// @param file  for the errors: what is not such a file, has no flights of "chain" and "straight", which
+/// every verdict takes, or counts that do not fit together
 Result<std::vector<FlownFlights>> flights_of_grid(std::string_view json, std::string_view file);
 
 /// "chain:100:99:0,straight:100:7:93", for a plan; and back. What is not of this form is an error.
