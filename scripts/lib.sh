@@ -10,7 +10,7 @@ packages_build=(
   libeigen3-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-video-dev
   liboctomap-dev libgeographiclib-dev
-  libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev
+  libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libboost-dev
   libsdformat-dev libembree-dev libassimp-dev  # the simulator, 15 MB of 58; the build does without where they are missing
   libbz2-dev liblz4-dev libzstd-dev libsqlite3-dev  # recordings of ROS; the build does without where they are missing
   libwebsockets-dev  # `pade live --web`; the build does without where it is missing

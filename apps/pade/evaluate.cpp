@@ -69,7 +69,7 @@ Result<DepthAccuracy> accuracy_of(const std::string& folder, const EvaluateArgum
 
 Json json_of(const std::string& run, const DepthAccuracy& accuracy) {
   Json json = {{"run", run}};
-  json.update(Json::parse(evaluation::to_json(accuracy)));
+  json.update(evaluation::json_of(accuracy));
   return json;
 }
 

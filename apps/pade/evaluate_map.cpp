@@ -20,7 +20,7 @@
 #include "pade/io/options_json.hpp"
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/trajectory.hpp"
-#include "pade/pipeline/map_replay.hpp"
+#include "pade/offline/map_replay.hpp"
 #include "pade/report/tables/map_accuracy_tables.hpp"
 #include "pade/simulation/render/truth.hpp"
 #include "pade/simulation/sdf/sdf_reader.hpp"
@@ -292,7 +292,7 @@ Status evaluate_maps(const EvaluateMapArguments& arguments) {
     if (!accuracy) return accuracy.error();
     if (arguments.json) {
       nlohmann::ordered_json json = {{"run", run}, {"world", arguments.world}};
-      json.update(nlohmann::ordered_json::parse(to_json(*accuracy)));
+      json.update(json_of(*accuracy));
       all.push_back(std::move(json));
     } else {
       fmt::print("{}{} in {}\n{}", &run == arguments.runs.data() ? "" : "\n\n", run, arguments.world,

@@ -379,10 +379,10 @@ Status inform_of_run(const InfoArguments& arguments) {
   }
   Json json = {{"kind", "run"},
                {"folder", arguments.path},
-               {"run", Json::parse(io::to_json(run->info))},
-               {"timing", Json::parse(io::to_json(run->timing))},
+               {"run", io::json_of(run->info)},
+               {"timing", io::json_of(run->timing)},
                {"evaluation", nullptr}};
-  if (*accuracy) json["evaluation"] = Json::parse(evaluation::to_json(**accuracy));
+  if (*accuracy) json["evaluation"] = evaluation::json_of(**accuracy);
   fmt::print("{}\n", json.dump(2));
   return {};
 }

@@ -16,8 +16,8 @@
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
-#include "pade/pipeline/depth_from.hpp"
-#include "pade/pipeline/map_sequence.hpp"
+#include "pade/offline/depth_from.hpp"
+#include "pade/offline/map_sequence.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
 
 #include "commands.hpp"

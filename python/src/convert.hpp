@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -155,7 +156,7 @@ Options options_of(py::handle options, Options defaults = {}) {
 py::dict dict_of_json(const std::string& json);
 template <OptionStruct Options>
 py::dict dict_of(const Options& options) {
-  return dict_of_json(io::to_json(options));
+  return dict_of_json(io::json_of(options).dump());
 }
 
 /// What a file name in Python means.

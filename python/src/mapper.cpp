@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "pade/mapping/query/map_view.hpp"
-#include "pade/pipeline/depth_from.hpp"
+#include "pade/offline/depth_from.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 
 #include "convert.hpp"

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "pade/pipeline/map_sequence.hpp"
+#include "pade/offline/map_sequence.hpp"
 
 #include "convert.hpp"
 

@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 namespace pade::io {
 namespace {
@@ -54,7 +55,7 @@ using testing::HasSubstr;
 TEST(OptionsJson, ComesBackAsItWas) {
   Outer written{7, Reading::samelson, "opencv: \"odd\"\n", {0.1, true}};
   Outer read;
-  const Status status = from_yaml(to_json(written), "run.json", read);
+  const Status status = from_yaml(json_of(written).dump(), "run.json", read);
   ASSERT_TRUE(status.ok()) << status.error().message;
   EXPECT_EQ(read, written);
 }
@@ -62,12 +63,12 @@ TEST(OptionsJson, ComesBackAsItWas) {
 TEST(OptionsJson, InfinityComesBackAsItWas) {
   Inner written{std::numeric_limits<double>::infinity(), false};
   Inner read;
-  ASSERT_TRUE(from_yaml(to_json(written), "run.json", read).ok());
+  ASSERT_TRUE(from_yaml(json_of(written).dump(), "run.json", read).ok());
   EXPECT_EQ(read, written);
 }
 
 TEST(OptionsJson, IsInTheOrderOfTheFields) {
-  EXPECT_EQ(to_json(Outer{}),
+  EXPECT_EQ(json_of(Outer{}).dump(),
             R"({"window":1,"reading":"least-squares","flow":"dis","inner":{"sigma":0.25,"strict":false}})");
 }
 

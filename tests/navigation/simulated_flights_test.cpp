@@ -13,7 +13,7 @@
 
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/navigation/navigation_run.hpp"
-#include "pade/pipeline/poses_from_sensors.hpp"
+#include "pade/offline/poses_from_sensors.hpp"
 #include "pade/report/navigation_report.hpp"
 #include "pade/simulation/flight/flight.hpp"
 #include "pade/simulation/flight/sensor_files.hpp"

@@ -497,7 +497,7 @@ TEST_F(Protocol, QuadrotorWithAGap) {
   int counts[5] = {};
   std::vector<double> chi_square;
   navigator.on_retired([&](const Measurement& m) {
-    if (m.kind != SensorKind::gnss_velocity || m.innovation.size == 0) return;
+    if (m.kind() != SensorKind::gnss_velocity || m.innovation.size == 0) return;
     ++counts[static_cast<int>(m.innovation.verdict)];
     chi_square.push_back(m.innovation.chi_square);
   });

@@ -12,7 +12,7 @@
 #include "pade/io/recording/flight/flight_writer.hpp"
 #include "pade/io/recording/recording.hpp"
 #include "pade/io/text.hpp"
-#include "pade/pipeline/map_sequence.hpp"
+#include "pade/offline/map_sequence.hpp"
 
 #include "commands.hpp"
 #include "progress.hpp"

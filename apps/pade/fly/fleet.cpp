@@ -135,8 +135,6 @@ double free_about(const FlightTask& task, double climb, double most) {
   return free;
 }
 
-ordered_json parsed(const std::string& text) { return ordered_json::parse(text); }
-
 ordered_json record_of(const FleetOptions& options) {
   ordered_json made = {{"made_by", fmt::format("pade {} fly", version)},
                        {"flight_revision", flight_revision},
@@ -151,7 +149,7 @@ ordered_json record_of(const FleetOptions& options) {
   }
   made["flier"] = to_name(options.flier);
   made["options"] =
-      parsed(options.flier == Flier::chain ? io::to_json(options.chain) : io::to_json(options.exact));
+      options.flier == Flier::chain ? io::json_of(options.chain) : io::json_of(options.exact);
   return made;
 }
 

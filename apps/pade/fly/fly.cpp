@@ -19,7 +19,7 @@
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/yaml.hpp"
-#include "pade/pipeline/depth_from.hpp"
+#include "pade/offline/depth_from.hpp"
 
 #include "../enum_option.hpp"
 #include "../progress.hpp"

@@ -13,7 +13,7 @@
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/text.hpp"
 #include "pade/paper/verdicts/flight_verdict.hpp"
-#include "pade/pipeline/depth_from.hpp"
+#include "pade/offline/depth_from.hpp"
 
 #include "../progress.hpp"
 #include "fleet.hpp"

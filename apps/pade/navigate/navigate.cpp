@@ -21,7 +21,7 @@
 #include "pade/live/recordings/tlog.hpp"
 #include "pade/live/recordings/ulog.hpp"
 #include "pade/navigation/navigation_run.hpp"
-#include "pade/pipeline/checked_log.hpp"
+#include "pade/offline/checked_log.hpp"
 #include "pade/report/gnss/raw_gnss_report.hpp"
 #include "pade/report/navigation_report.hpp"
 

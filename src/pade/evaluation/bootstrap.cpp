@@ -2,46 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <vector>
+
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
 
 #include "pade/core/random.hpp"
 
 namespace pade::evaluation {
 namespace {
 
-double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+/// Where a share is 0 or 1 the quantile is infinite, and no error.
+using Normal = boost::math::normal_distribution<
+    double, boost::math::policies::policy<
+                boost::math::policies::overflow_error<boost::math::policies::ignore_error>>>;
 
-// Student's t with a whole number of degrees of freedom (Abramowitz and Stegun 26.7.3, 26.7.4), t >= 0.
-double student_cdf(double t, int freedom) {
-  const double angle = std::atan(t / std::sqrt(freedom));
-  const double cosine2 = std::cos(angle) * std::cos(angle);
-  const bool odd = freedom % 2 == 1;
-  double term = odd ? std::cos(angle) : 1;
-  double sum = freedom > 1 ? term : 0;
-  for (int k = odd ? 3 : 2; k < freedom; k += 2) {
-    term *= cosine2 * (k - 1) / k;
-    sum += term;
-  }
-  const double within = odd ? 2 / std::numbers::pi * (angle + std::sin(angle) * sum) : std::sin(angle) * sum;
-  return 0.5 * (1 + within);
-}
-
-// The argument at which an increasing function of [from, to] reaches `value`.
-template <class Function>
-double invert(Function function, double value, double from, double to) {
-  for (int step = 0; step < 100; ++step) {
-    const double middle = 0.5 * (from + to);
-    (function(middle) < value ? from : to) = middle;
-  }
-  return 0.5 * (from + to);
-}
-
-double normal_quantile(double share) { return invert(normal_cdf, share, -40, 40); }
-
+double normal_cdf(double z) { return cdf(Normal(), z); }
+double normal_quantile(double share) { return quantile(Normal(), share); }
 double student_quantile(double share, int freedom) {
-  return invert([freedom](double t) { return student_cdf(t, freedom); }, share, 0, 1e9);
+  return quantile(boost::math::students_t(freedom), share);
 }
 
 double mean_of(const std::vector<double>& values) {

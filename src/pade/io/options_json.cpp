@@ -14,13 +14,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const OptionFields& fields);
-
 Json json_of(const OptionField& field) {
   return std::visit(
       []<class Value>(const Value& value) -> Json {
         if constexpr (std::is_same_v<Value, OptionFields>) {
-          return json_of(value);
+          return io::json_of(value);
         } else if constexpr (std::is_same_v<Value, EnumField>) {
           return std::string(value.get());
         } else if constexpr (std::is_same_v<Value, double*>) {
@@ -32,12 +30,6 @@ Json json_of(const OptionField& field) {
         }
       },
       field.value);
-}
-
-Json json_of(const OptionFields& fields) {
-  Json json = Json::object();
-  for (const OptionField& field : fields) json[field.name] = json_of(field);
-  return json;
 }
 
 struct Source {
@@ -115,7 +107,11 @@ Status read_mapping(const YAML::Node& node, const OptionFields& fields, const So
 
 }  // namespace
 
-std::string to_json(const OptionFields& fields, int indent) { return json_of(fields).dump(indent); }
+Json json_of(const OptionFields& fields) {
+  Json json = Json::object();
+  for (const OptionField& field : fields) json[field.name] = json_of(field);
+  return json;
+}
 
 Status from_yaml(std::string_view text, std::string_view file, const OptionFields& fields) {
   try {  // yaml-cpp reports by exceptions; they end here

@@ -11,6 +11,8 @@
 #include <variant>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "pade/core/options.hpp"
 #include "pade/core/result.hpp"
 
@@ -60,12 +62,13 @@ OptionFields option_fields(Options& options) {
   return fields;
 }
 
-/// The values as a JSON object, in the order of the fields. `indent` spaces per level; negative = one line.
-std::string to_json(const OptionFields& fields, int indent = -1);
-template <OptionStruct Options>
-std::string to_json(const Options& options, int indent = -1) {
+/// The values as a JSON object, in the order of the fields. Infinities are texts, ".inf" and "-.inf".
+nlohmann::ordered_json json_of(const OptionFields& fields);
+/// Who calls it includes <nlohmann/json.hpp>.
+template <OptionStruct Options, class Json = nlohmann::ordered_json>
+Json json_of(const Options& options) {
   Options copy = options;
-  return to_json(option_fields(copy), indent);
+  return json_of(option_fields(copy));
 }
 
 /// Options that know what makes no sense (core/option_check.hpp).

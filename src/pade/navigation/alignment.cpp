@@ -40,9 +40,9 @@ Matrix3d attitude_covariance(const Quaterniond& R, double tilt_sigma, double yaw
 
 /// The velocity of the antenna that a measurement gives, if it gives one.
 std::optional<GnssVelocity> velocity_in(const Measurement& m) {
-  if (m.kind == SensorKind::raw_gnss) return m.raw->velocity;
-  if (m.kind != SensorKind::gnss_velocity) return std::nullopt;
-  return GnssVelocity{m.time, m.value, m.covariance};
+  if (const auto* raw = m.get_if<std::shared_ptr<const RawEpoch>>()) return (*raw)->velocity;
+  if (const auto* velocity = m.get_if<GnssVelocity>()) return *velocity;
+  return std::nullopt;
 }
 
 /// Faster than the noise of what is measured of it explains.
@@ -53,9 +53,9 @@ bool shows_motion(const GnssVelocity& velocity, double rest_speed) {
 }
 
 std::optional<GnssFix> fix_in(const Measurement& m) {
-  if (m.kind == SensorKind::raw_gnss) return m.raw->fix;
-  if (m.kind != SensorKind::gnss_position) return std::nullopt;
-  return GnssFix{m.time, m.value, m.covariance};
+  if (const auto* raw = m.get_if<std::shared_ptr<const RawEpoch>>()) return (*raw)->fix;
+  if (const auto* fix = m.get_if<GnssFix>()) return *fix;
+  return std::nullopt;
 }
 
 /// The last velocity or fix in [from, to], with its stamp on the filter's time scale.
@@ -71,11 +71,12 @@ auto last_gnss(const Timeline& timeline, Time from, Time to, const Get& get) {
   return decltype(get(timeline.measurements[0])){};
 }
 
-/// The last measurement of a kind in [from, to].
-const Measurement* last_of(const Timeline& timeline, SensorKind kind, Time from, Time to) {
+/// The last measurement of a sensor in [from, to].
+template <class Sensor>
+const Sensor* last_of(const Timeline& timeline, Time from, Time to) {
   for (std::size_t i = timeline.measurements.count_until(to);
        i-- > 0 && timeline.measurements[i].time >= from;) {
-    if (timeline.measurements[i].kind == kind) return &timeline.measurements[i];
+    if (const auto* found = timeline.measurements[i].get_if<Sensor>()) return found;
   }
   return nullptr;
 }
@@ -171,12 +172,12 @@ bool Alignment::start_from_rest(Timeline& timeline, Time now) {
   if (!rest) return false;
   const Time from = earlier(now, options_.level_time);
   std::optional<Yaw> yaw;
-  if (const Measurement* heading = last_of(timeline, SensorKind::heading, from, now)) {
-    yaw = Yaw{heading->value.x(), heading->sigma};
-  } else if (const Measurement* field = last_of(timeline, SensorKind::magnetometer, from, now)) {
+  if (const auto* heading = last_of<Heading>(timeline, from, now)) {
+    yaw = Yaw{heading->yaw, heading->sigma};
+  } else if (const auto* field = last_of<MagneticField>(timeline, from, now)) {
     const Quaterniond level = attitude(rest->specific_force, Vector3d::UnitZ(), 0);
     const double north = 0.5 * std::numbers::pi - timeline.declination;
-    yaw = Yaw{north - azimuth(level * field->value), options_.heading_sigma_magnetic};
+    yaw = Yaw{north - azimuth(level * field->field), options_.heading_sigma_magnetic};
   }
   const double spacing = 2 * std::numbers::pi / static_cast<double>(bank_.size());
   for (std::size_t i = 0; i < bank_.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <utility>
+#include <variant>
 
 #include "pade/core/lie.hpp"
 #include "pade/core/sensors/measurements.hpp"
@@ -53,7 +54,7 @@ struct Innovation {
   double jump = 0;  ///< distance the position (or speed the velocity) moved in a re-acquisition, m or m/s
 };
 
-/// Sensors; also the order in which measurements of one stamp are used.
+/// Sensors, in the order of Measurement::value; also the order in which measurements of one stamp are used.
 enum class SensorKind : std::uint8_t {
   gnss_velocity,
   gnss_position,
@@ -66,43 +67,30 @@ enum class SensorKind : std::uint8_t {
   raw_gnss,
   camera
 };
-inline constexpr std::size_t sensor_kinds =
-    static_cast<std::size_t>(SensorKind::camera) + 1;  ///< camera is the last
 
-/// A measurement of any kind.
+/// A measurement of any sensor.
 struct Measurement {
-  Time time;                                    ///< of the measurement, less the sensor's latency
-  SensorKind kind = SensorKind::gnss_position;  ///< says what `value` is
-  Vector3d value = Vector3d::Zero();            ///< scalar sensors use the first component
-  Matrix3d covariance = Matrix3d::Identity();   ///< GNSS only
-  double sigma = 0;                             ///< the others
-  double extra = 0;                             ///< ground height of a range
-  std::shared_ptr<const RawEpoch> raw;          ///< raw GNSS only, and then not null
-  std::shared_ptr<const CameraMotion> camera;  ///< camera only; null: an image from which one may be measured
-  Innovation innovation;                       ///< of its last use by the live filter
+  /// As the sensor delivered it, with its own stamp. An epoch of raw GNSS is never null; a motion is null for an
+  /// image from which one may be measured.
+  using Value =
+      std::variant<GnssVelocity, GnssFix, BarometricHeight, Heading, MagneticField, ZeroVelocity, RangeToGround,
+                   RoadMotion, std::shared_ptr<const RawEpoch>, std::shared_ptr<const CameraMotion>>;
+
+  Time time;              ///< on the filter's time scale: the sensor's stamp less its latency
+  Value value;
+  Innovation innovation;  ///< of its last use by the live filter
 
   Measurement() = default;
-  /// @{
-  /// From what the sensors deliver (core/sensors/measurements.hpp).
-  explicit Measurement(const GnssFix& m) : time(m.time), value(m.position), covariance(m.covariance) {}
-  explicit Measurement(const GnssVelocity& m)
-      : time(m.time), kind(SensorKind::gnss_velocity), value(m.velocity), covariance(m.covariance) {}
-  explicit Measurement(const BarometricHeight& m)
-      : time(m.time), kind(SensorKind::barometer), value(m.height, 0, 0), sigma(m.sigma) {}
-  explicit Measurement(const Heading& m)
-      : time(m.time), kind(SensorKind::heading), value(m.yaw, 0, 0), sigma(m.sigma) {}
-  explicit Measurement(const MagneticField& m)
-      : time(m.time), kind(SensorKind::magnetometer), value(m.field), sigma(m.sigma) {}
-  explicit Measurement(const ZeroVelocity& m)
-      : time(m.time), kind(SensorKind::zero_velocity), sigma(m.sigma) {}
-  explicit Measurement(const RangeToGround& m)
-      : time(m.time), kind(SensorKind::range), value(m.range, 0, 0), sigma(m.sigma), extra(m.ground_height) {}
-  explicit Measurement(const RoadMotion& m) : time(m.time), kind(SensorKind::road), sigma(m.sigma) {}
-  Measurement(std::shared_ptr<const RawEpoch> epoch, Time stamp)
-      : time(stamp), kind(SensorKind::raw_gnss), raw(std::move(epoch)) {}
-  Measurement(std::shared_ptr<const CameraMotion> motion, Time stamp)
-      : time(stamp), kind(SensorKind::camera), camera(std::move(motion)) {}
-  /// @}
+  /// Throws nothing; `latency` in s.
+  Measurement(Time at, Value of) : time(at), value(std::move(of)) {}
+
+  [[nodiscard]] SensorKind kind() const { return static_cast<SensorKind>(value.index()); }
+  /// Null if it is of another sensor, or of an image without a motion.
+  template <class Sensor>
+  [[nodiscard]] const Sensor* get_if() const {
+    return std::get_if<Sensor>(&value);
+  }
 };
+inline constexpr std::size_t sensor_kinds = std::variant_size_v<Measurement::Value>;
 
 }  // namespace pade::navigation

@@ -14,6 +14,8 @@
 namespace pade::navigation {
 namespace {
 
+using Image = std::shared_ptr<const CameraMotion>;
+
 constexpr double kKeyframeInterval = 0.1;  // s
 constexpr double kYawKnown = 0.125;        // rad, about 7°
 
@@ -54,7 +56,7 @@ class Navigator::Core {
   explicit Core(const NavigatorOptions& options);
 
   void add(const ImuSample& sample);
-  void add(Measurement measurement, double latency, bool finite);
+  void add(Time stamp, double latency, Measurement::Value value, bool finite);
   void add(const CameraMotion& motion);
   RelativePose relative_pose(Time t1, Time t2, const Pose& T_body_camera);
   AbsolutePose absolute_pose(Time t);
@@ -172,12 +174,12 @@ void Navigator::Core::advance_live(Time to) {
   });
 }
 
-void Navigator::Core::add(Measurement measurement, double latency, bool finite) {
+void Navigator::Core::add(Time stamp, double latency, Measurement::Value value, bool finite) {
   if (!finite) {
     ++health_.unusable;
     return;
   }
-  measurement.time = shifted(measurement.time, -latency);
+  const Measurement measurement(shifted(stamp, -latency), std::move(value));
   const bool aligned = phase_ == AlignmentPhase::aligned;
   if (aligned && measurement.time <= keyframes_.front().time) {
     ++health_.too_late;
@@ -209,8 +211,8 @@ void Navigator::Core::add(const CameraMotion& motion) {
   stamped->t1 = imu_time(motion.t1);
   stamped->t2 = imu_time(motion.t2);
   auto& all = timeline_.measurements;
-  const Measurement mark(std::shared_ptr<const CameraMotion>(), stamped->t1);
-  const Measurement measured(stamped, stamped->t2);
+  const Measurement mark(stamped->t1, Image());
+  const Measurement measured(stamped->t2, Image(stamped));
   const bool aligned = phase_ == AlignmentPhase::aligned;
   // An image at t1 that ends no motion has to be marked, and the filter to go back to it.
   const auto marked = timeline_.place_of(mark);
@@ -224,12 +226,12 @@ void Navigator::Core::add(const CameraMotion& motion) {
   } else {
     // At t2 stands the mark of a later motion that came before this one, or this motion.
     std::size_t at = all.count_until(measured.time) - 1;
-    while (all[at].kind != SensorKind::camera) --at;
-    if (all[at].camera) {
+    while (all[at].kind() != SensorKind::camera) --at;
+    if (*all[at].get_if<Image>()) {
       ++health_.duplicates;
       return;
     }
-    all[at].camera = stamped;
+    all[at].value = Image(stamped);
   }
   if (const auto place = timeline_.place_of(mark)) all.insert(*place, mark);
   if (aligned) replay_from(first);
@@ -238,7 +240,8 @@ void Navigator::Core::add(const CameraMotion& motion) {
 void Navigator::Core::retire(Time before) {
   while (!timeline_.measurements.empty() && timeline_.measurements.front().time < before) {
     const Measurement& oldest = timeline_.measurements.front();
-    const bool is_mark = oldest.kind == SensorKind::camera && !oldest.camera;
+    const auto* image = oldest.get_if<Image>();
+    const bool is_mark = image != nullptr && !*image;
     if (sink_ && !is_mark) sink_(oldest);
     timeline_.measurements.pop_front();
   }
@@ -374,41 +377,41 @@ Navigator::~Navigator() = default;
 
 void Navigator::add(const ImuSample& sample) { core_->add(sample); }
 void Navigator::add(const GnssFix& measurement) {
-  core_->add(Measurement(measurement), core_->options().gnss_position_latency,
+  core_->add(measurement.time, core_->options().gnss_position_latency, measurement,
              measurement.position.allFinite() && measurement.covariance.allFinite());
 }
 void Navigator::add(const GnssVelocity& measurement) {
-  core_->add(Measurement(measurement), core_->options().gnss_velocity_latency,
+  core_->add(measurement.time, core_->options().gnss_velocity_latency, measurement,
              measurement.velocity.allFinite() && measurement.covariance.allFinite());
 }
 void Navigator::add(const BarometricHeight& measurement) {
-  core_->add(Measurement(measurement), core_->options().barometer_latency,
+  core_->add(measurement.time, core_->options().barometer_latency, measurement,
              std::isfinite(measurement.height) && std::isfinite(measurement.sigma));
 }
 void Navigator::add(const Heading& measurement) {
-  core_->add(Measurement(measurement), 0, std::isfinite(measurement.yaw) && std::isfinite(measurement.sigma));
+  core_->add(measurement.time, 0, measurement, std::isfinite(measurement.yaw) && std::isfinite(measurement.sigma));
 }
 void Navigator::add(const MagneticField& measurement) {
-  core_->add(Measurement(measurement), core_->options().magnetometer_latency,
+  core_->add(measurement.time, core_->options().magnetometer_latency, measurement,
              measurement.field.allFinite() && std::isfinite(measurement.sigma));
 }
 void Navigator::add(const ZeroVelocity& measurement) {
-  core_->add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
+  core_->add(measurement.time, 0, measurement, std::isfinite(measurement.sigma));
 }
 void Navigator::add(const RangeToGround& measurement) {
-  core_->add(Measurement(measurement), 0,
+  core_->add(measurement.time, 0, measurement,
              std::isfinite(measurement.range) && std::isfinite(measurement.sigma) &&
                  std::isfinite(measurement.ground_height));
 }
 
 void Navigator::add(const RoadMotion& measurement) {
-  core_->add(Measurement(measurement), 0, std::isfinite(measurement.sigma));
+  core_->add(measurement.time, 0, measurement, std::isfinite(measurement.sigma));
 }
 
 void Navigator::add(std::shared_ptr<const RawEpoch> measurement) {
   if (!measurement) return;
   const Time time = measurement->time;
-  core_->add(Measurement(std::move(measurement), time), core_->options().gnss_position_latency, true);
+  core_->add(time, core_->options().gnss_position_latency, std::move(measurement), true);
 }
 
 void Navigator::add(const CameraMotion& measurement) { core_->add(measurement); }

@@ -2,37 +2,35 @@
 
 namespace pade::navigation {
 
-Innovation apply(Filter& filter, const Measurement& m, double declination) {
-  switch (m.kind) {
-    case SensorKind::gnss_velocity:
-      return filter.update(GnssVelocity{m.time, m.value, m.covariance});
-    case SensorKind::gnss_position:
-      return filter.update(GnssFix{m.time, m.value, m.covariance});
-    case SensorKind::barometer:
-      return filter.update(BarometricHeight{m.time, m.value.x(), m.sigma});
-    case SensorKind::heading:
-      return filter.update(Heading{m.time, m.value.x(), m.sigma});
-    case SensorKind::magnetometer:
-      return filter.update(MagneticField{m.time, m.value, m.sigma}, declination);
-    case SensorKind::zero_velocity:
-      return filter.update(ZeroVelocity{m.time, m.sigma});
-    case SensorKind::road:
-      return filter.update(RoadMotion{m.time, m.sigma});
-    case SensorKind::raw_gnss:
-      return filter.update(*m.raw);
-    case SensorKind::camera:
-      return m.camera ? filter.update(*m.camera) : filter.mark_image();
-    case SensorKind::range:
-      return filter.update(RangeToGround{m.time, m.value.x(), m.sigma, m.extra});
+namespace {
+
+/// Each kind of measurement with what of the filter uses it.
+struct UpdateOf {
+  Filter& filter;
+  double declination;
+
+  Innovation operator()(const MagneticField& m) const { return filter.update(m, declination); }
+  Innovation operator()(const std::shared_ptr<const RawEpoch>& m) const { return filter.update(*m); }
+  Innovation operator()(const std::shared_ptr<const CameraMotion>& m) const {
+    return m ? filter.update(*m) : filter.mark_image();
   }
-  return {};
+  template <class Sensor>
+  Innovation operator()(const Sensor& m) const {
+    return filter.update(m);
+  }
+};
+
+}  // namespace
+
+Innovation apply(Filter& filter, const Measurement& measurement, double declination) {
+  return std::visit(UpdateOf{filter, declination}, measurement.value);
 }
 
 std::optional<std::size_t> Timeline::place_of(const Measurement& measurement) const {
   std::size_t at = measurements.count_until(measurement.time);
   while (at > 0 && measurements[at - 1].time == measurement.time &&
-         measurements[at - 1].kind >= measurement.kind) {
-    if (measurements[at - 1].kind == measurement.kind) return std::nullopt;
+         measurements[at - 1].kind() >= measurement.kind()) {
+    if (measurements[at - 1].kind() == measurement.kind()) return std::nullopt;
     --at;
   }
   return at;

@@ -25,7 +25,7 @@ std::string innovation_plot(const NavigationRun& run, navigation::SensorKind kin
   for (std::size_t axis = 0; axis < 3; ++axis) series.push_back({kAxes[axis], kColours[axis], {}, {}, true});
   Series upper{"3 sigma, east", "#999999", {}, {}, false};
   for (const navigation::Measurement& m : run.measurements) {
-    if (m.kind != kind || m.innovation.size != 3 || m.innovation.sigma.x() > 100) continue;
+    if (m.kind() != kind || m.innovation.size != 3 || m.innovation.sigma.x() > 100) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<Eigen::Index>(axis);
       series[axis].add(m.time.seconds(), m.innovation.residual[a]);

@@ -282,7 +282,7 @@ TEST(ChangedOutcomes, AreThoseThatDiffer) {
 TEST(VerdictJson, HoldsWhatTheVerdictSays) {
   auto verdicts = judge_accuracy(rows_of(papers_world()));
   verdicts.push_back(judge_flights({}));
-  const auto json = nlohmann::json::parse(to_json(verdicts));
+  const auto json = json_of(verdicts);
   ASSERT_EQ(json.size(), verdicts.size());
   EXPECT_EQ(json[0]["claim"], verdicts[0].claim);
   EXPECT_EQ(json[0]["outcome"], std::string(outcome_name(verdicts[0].outcome)));

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "pade/evaluation/range_means.hpp"
 
@@ -33,7 +34,7 @@ TEST(DataTable, QuotesAndLeavesNothingForNaN) {
       {"a", "b", "c"},
       {{std::string("x,\"y\""), 0.1, std::uint64_t{7}}, {std::string("z"), nan, std::uint64_t{0}}}};
   EXPECT_EQ(to_csv(table), "a,b,c\n\"x,\"\"y\"\"\",0.1,7\nz,,0\n");
-  EXPECT_EQ(to_json(table), R"([{"a":"x,\"y\"","b":0.1,"c":7},{"a":"z","b":null,"c":0}])");
+  EXPECT_EQ(json_of(table).dump(), R"([{"a":"x,\"y\"","b":0.1,"c":7},{"a":"z","b":null,"c":0}])");
 }
 
 TEST(RangeMeans, CountsWhatHasTruthAndAverageWhatHasAnAnswer) {

@@ -311,7 +311,7 @@ std::filesystem::path side_car_of(const std::filesystem::path& map_file) {
 std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin,
                             const Eigen::Vector3d& local_origin) {
   nlohmann::ordered_json json;
-  json["options"] = nlohmann::ordered_json::parse(to_json(options));
+  json["options"] = json_of(options);
   if (origin) {
     json["geographic_origin"] = {{"datum", "WGS-84"},
                                  {"latitude_deg", origin->latitude_deg},

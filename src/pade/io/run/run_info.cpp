@@ -173,7 +173,7 @@ double scale_for_range(double range) {
   return std::max(1.0, std::floor(65534.0 / range));
 }
 
-std::string to_json(const RunInfo& info) {
+Json json_of(const RunInfo& info) {
   Json json = {{"format", kRunFormat},
                {"version", info.version},
                {"sequence", info.sequence.string()},
@@ -205,7 +205,11 @@ std::string to_json(const RunInfo& info) {
   if (info.origin) json["geographic_origin"] = json_by(origin_fields, *info.origin);
   if (info.motion.stamp_offset) json["stamp_offset"] = json_by(offset_fields, *info.motion.stamp_offset);
   if (info.map) json["map"] = json_by(map_fields, *info.map);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json;
+}
+
+std::string to_json(const RunInfo& info) {
+  return json_of(info).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file) {
@@ -252,14 +256,15 @@ Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file)
   return info;
 }
 
-std::string to_json(const RunTiming& timing) {
-  const Json json = {{"stages", list_by(stage_fields, timing.stages)},
+Json json_of(const RunTiming& timing) {
+  return {{"stages", list_by(stage_fields, timing.stages)},
                      {"frames_per_second", timing.frames_per_second},
                      {"peak_memory_bytes", timing.peak_memory},
                      {"cpu_seconds", timing.cpu_seconds},
                      {"stages_cpu_seconds", timing.stages_cpu_seconds}};
-  return json.dump(2) + "\n";
 }
+
+std::string to_json(const RunTiming& timing) { return json_of(timing).dump(2) + "\n"; }
 
 Result<RunTiming> run_timing_from_json(std::string_view text, std::string_view file) {
   const Result<Json> json = parse(text, file);

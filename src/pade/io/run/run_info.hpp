@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "pade/core/camera.hpp"
 #include "pade/core/depth_image.hpp"
 #include "pade/core/health.hpp"
@@ -48,7 +50,7 @@ struct RunInfo {
   std::string version;             ///< of the program that wrote the run
   std::filesystem::path sequence;  ///< absolute
   std::string poses;               ///< name of the pose file
-  std::string options = "{}";      ///< JSON object, from to_json(options)
+  std::string options = "{}";      ///< JSON object, the text of json_of(options)
   Camera camera;                   ///< of the undistorted images
   int window = 1;                  ///< n: one depth per n x n pixels (the stacks have full size all the same)
   double range_limit = 0;          ///< metres; depth beyond is none. 0 = no limit
@@ -102,8 +104,13 @@ double thread_cpu_seconds();
 /// (range not positive or infinite): 500, for 131 m.
 double scale_for_range(double range);
 
+nlohmann::ordered_json json_of(const RunInfo& info);
+nlohmann::ordered_json json_of(const RunTiming& timing);
+/// @{
+/// The same as the text of run.json and timing.json; what is not UTF-8 is replaced.
 std::string to_json(const RunInfo& info);
 std::string to_json(const RunTiming& timing);
+/// @}
 /// `file` is what messages call the text.
 Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file);
 Result<RunTiming> run_timing_from_json(std::string_view text, std::string_view file);

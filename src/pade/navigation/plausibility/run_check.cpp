@@ -73,7 +73,7 @@ std::vector<SensorSummary> summarise(std::span<const Measurement> measurements) 
   std::array<double, sensor_kinds> freedom{};
   for (const Measurement& m : measurements) {
     if (m.innovation.verdict == Verdict::unusable) continue;
-    const auto kind = static_cast<std::size_t>(m.kind);
+    const auto kind = m.value.index();
     SensorSummary& sum = sums[kind];
     ++sum.measurements;
     if (m.innovation.verdict == Verdict::rejected || m.innovation.verdict == Verdict::reacquired)

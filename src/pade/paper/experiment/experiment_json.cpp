@@ -95,14 +95,14 @@ Json to_value(const Job& job) {
   Json cells = Json::array();
   for (const DepthCell& cell : job.cells) {
     cells.push_back({{"name", cell.name},
-                     {"depth", Json::parse(io::to_json(cell.depth))},
+                     {"depth", io::json_of(cell.depth)},
                      {"misreading", to_name(cell.misreading)},
                      {"noise_on", static_cast<int>(cell.measured)},
                      {"rival", cell.rival}});
   }
   Json chain = Json::object();
   if (!job.chain.empty()) {
-    chain = {{"name", job.chain}, {"mapper", Json::parse(io::to_json(chain_options(job.chain, job.range)))}};
+    chain = {{"name", job.chain}, {"mapper", io::json_of(chain_options(job.chain, job.range))}};
   }
   return {{"table", job.table},
           {"sequence", job.sequence},
@@ -113,7 +113,7 @@ Json to_value(const Job& job) {
           {"step", job.step},
           {"range", job.range},
           {"grid", job.grid},
-          {"noise", Json::parse(io::to_json(job.noise))},
+          {"noise", io::json_of(job.noise)},
           {"draws", job.draws},
           {"seed", job.seed},
           {"bound_sigma_px", job.bound_sigma},

@@ -54,16 +54,17 @@ std::string file_content(const std::string& job, const std::string& result) {
 
 }  // namespace
 
-std::string to_json(const Experiment& experiment) {
+Json json_of(const Experiment& experiment) {
   Json sequences = Json::array();
   for (const NamedSequence& sequence : experiment.sequences) {
     sequences.push_back({{"name", sequence.name}, {"fingerprint", sequence.fingerprint}});
   }
-  const Json json = {{"pade", version},
-                     {"options", Json::parse(io::to_json(experiment.options))},
-                     {"sequences", std::move(sequences)}};
-  return json.dump(2) + "\n";
+  return {{"pade", version},
+          {"options", io::json_of(experiment.options)},
+          {"sequences", std::move(sequences)}};
 }
+
+std::string to_json(const Experiment& experiment) { return json_of(experiment).dump(2) + "\n"; }
 
 Result<Experiment> experiment_from_json(std::string_view text, std::string_view file) {
   try {  // nlohmann reports by exceptions; they end here

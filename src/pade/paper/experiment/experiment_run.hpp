@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "pade/core/result.hpp"
 #include "pade/paper/experiment/experiment_plan.hpp"
 #include "pade/paper/experiment/experiment_store.hpp"
@@ -29,6 +31,8 @@ struct Experiment {
 };
 
 /// Content of plan.json: the options, the sequences by name and fingerprint, the version.
+nlohmann::ordered_json json_of(const Experiment& experiment);
+/// The same as the text of plan.json.
 std::string to_json(const Experiment& experiment);
 /// The folders stay empty: what is known is what is needed to read finished jobs.
 Result<Experiment> experiment_from_json(std::string_view text, std::string_view file);

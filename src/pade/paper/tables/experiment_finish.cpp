@@ -221,7 +221,7 @@ std::string page_of(const Experiment& experiment, const std::vector<Section>& se
   report.facts = {{"program", fmt::format("pade {}", version)},
                   {"command", command_of(experiment.options, "all")},
                   {"sequences", names}};
-  const Json options = Json::parse(io::to_json(experiment.options));
+  const Json options = io::json_of(experiment.options);
   for (const auto& [name, value] : options.items())
     report.options.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
   for (const NamedSequence& sequence : experiment.sequences)
@@ -263,10 +263,10 @@ Json tables_json(const std::vector<Section>& sections) {
 
 std::string experiment_json(const Experiment& experiment, const Results& results,
                             const std::vector<Section>& sections, const std::vector<Verdict>& verdicts) {
-  Json json = Json::parse(to_json(experiment));
-  json["verdicts"] = Json::parse(evaluation::to_json(verdicts));
+  Json json = json_of(experiment);
+  json["verdicts"] = evaluation::json_of(verdicts);
   json["tables"] = tables_json(sections);
-  json["cells"] = Json::parse(evaluation::to_json(all_cells(results)));
+  json["cells"] = evaluation::json_of(all_cells(results));
   return json.dump(1) + "\n";
 }
 
@@ -281,7 +281,7 @@ Result<std::string> timing_json(const Experiment& experiment, const Store& store
     jobs[task.name] = Json::parse(*text);
   }
   const Json json = {{"machine", machine()},
-                     {"verdicts", Json::parse(evaluation::to_json(verdicts))},
+                     {"verdicts", evaluation::json_of(verdicts)},
                      {"tables", tables_json(sections)},
                      {"jobs", std::move(jobs)}};
   return json.dump(1) + "\n";

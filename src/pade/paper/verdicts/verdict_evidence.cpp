@@ -93,7 +93,7 @@ std::vector<OutcomeChange> changed_outcomes(std::span<const Verdict> before, std
   return changes;
 }
 
-std::string to_json(std::span<const Verdict> verdicts) {
+nlohmann::ordered_json json_of(std::span<const Verdict> verdicts) {
   using Json = nlohmann::ordered_json;
   const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
   Json list = Json::array();
@@ -108,7 +108,7 @@ std::string to_json(std::span<const Verdict> verdicts) {
                     {"high", number(v.interval.high)},
                     {"sequences", v.interval.count}});
   }
-  return list.dump(2) + "\n";
+  return list;
 }
 
 }  // namespace pade::evaluation

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "pade/evaluation/bootstrap.hpp"
 
 namespace pade::evaluation {
@@ -103,6 +105,6 @@ struct OutcomeChange {
 std::vector<OutcomeChange> changed_outcomes(std::span<const Verdict> before, std::span<const Verdict> after);
 
 /// An array of objects; NaN is null.
-std::string to_json(std::span<const Verdict> verdicts);
+nlohmann::ordered_json json_of(std::span<const Verdict> verdicts);
 
 }  // namespace pade::evaluation

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <memory>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -22,6 +23,7 @@ using evaluation::simple_plot;
 using gnss::EpochResult;
 using gnss::SatelliteView;
 using gnss::Use;
+using RawPointer = std::shared_ptr<const navigation::RawEpoch>;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 const std::array<std::string, gnss::kSystems> kSystemNames = {"GPS", "GLONASS", "Galileo", "BeiDou"};
@@ -365,16 +367,18 @@ std::string slip_plot(const NavigationRun& run) {
   SlipRows rows;
   std::optional<Time> first;
   for (const navigation::Measurement& m : run.measurements) {
-    if (m.kind != navigation::SensorKind::raw_gnss) continue;
+    const auto* raw = m.get_if<RawPointer>();
+    if (raw == nullptr) continue;
     if (!first) first = m.time;
-    for (const navigation::RawSatellite& s : m.raw->satellites) rows.expect(s.satellite);
+    for (const navigation::RawSatellite& s : (*raw)->satellites) rows.expect(s.satellite);
   }
   rows.number();
   for (const navigation::Measurement& m : run.measurements) {
-    if (m.kind != navigation::SensorKind::raw_gnss) continue;
+    const auto* raw = m.get_if<RawPointer>();
+    if (raw == nullptr) continue;
     const double t = seconds_between(*first, m.time);
-    for (std::size_t i = 0; i < std::min<std::size_t>(m.raw->satellites.size(), 64); ++i) {
-      const navigation::RawSatellite& s = m.raw->satellites[i];
+    for (std::size_t i = 0; i < std::min<std::size_t>((*raw)->satellites.size(), 64); ++i) {
+      const navigation::RawSatellite& s = (*raw)->satellites[i];
       const auto has = [&](std::uint64_t bits) { return (bits >> i & 1) != 0; };
       if (s.phase) rows.judge(t, s.satellite, s.lost_lock, s.half_cycle, has(m.innovation.refused_phases));
       if (has(m.innovation.refused_ranges)) rows.refuse_range(t, s.satellite);

@@ -101,7 +101,7 @@ std::string to_csv(const DepthAccuracy& accuracy) {
   return csv;
 }
 
-std::string to_json(const DepthAccuracy& accuracy) {
+Json json_of(const DepthAccuracy& accuracy) {
   Json ranges = Json::array();
   for (const RangeAccuracy* row : rows_of(accuracy)) {
     Json range = {{"range", range_name(*row)}, {"from_m", row->from}, {"to_m", finite_or_null(row->to)}};
@@ -109,10 +109,10 @@ std::string to_json(const DepthAccuracy& accuracy) {
     for (const auto& [name, field] : kFigures) range[name] = finite_or_null(row->*field);
     ranges.push_back(std::move(range));
   }
-  const Json json = {
-      {"frames", accuracy.frames}, {"max_depth_m", accuracy.max_depth}, {"ranges", std::move(ranges)}};
-  return json.dump(2) + "\n";
+  return {{"frames", accuracy.frames}, {"max_depth_m", accuracy.max_depth}, {"ranges", std::move(ranges)}};
 }
+
+std::string to_json(const DepthAccuracy& accuracy) { return json_of(accuracy).dump(2) + "\n"; }
 
 Result<DepthAccuracy> accuracy_from_json(std::string_view text, std::string_view file) {
   DepthAccuracy accuracy;

@@ -177,7 +177,7 @@ std::string to_table(const MapAccuracy& a) {
   return text;
 }
 
-std::string to_json(const MapAccuracy& a) {
+Json json_of(const MapAccuracy& a) {
   Json json = {{"frames", a.frames},
                {"frames_with_pose", a.frames_with_pose},
                {"frames_compared", a.frames_compared},
@@ -205,7 +205,7 @@ std::string to_json(const MapAccuracy& a) {
                          {"occupied_voxels", a.reference->occupied},
                          {"occupied_share", json_share(a.map.occupied, a.reference->occupied)}};
   }
-  return json.dump(2);
+  return json;
 }
 
 }  // namespace pade::evaluation

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "pade/evaluation/map/map_accuracy.hpp"
 #include "pade/evaluation/map/rigid_alignment.hpp"
 #include "pade/evaluation/map/view_ahead.hpp"
@@ -43,6 +45,6 @@ struct MapAccuracy {
 /// For a terminal.
 std::string to_table(const MapAccuracy& accuracy);
 /// An object; shares from 0 to 1, null if they are over nothing.
-std::string to_json(const MapAccuracy& accuracy);
+nlohmann::ordered_json json_of(const MapAccuracy& accuracy);
 
 }  // namespace pade::evaluation

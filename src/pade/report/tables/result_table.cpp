@@ -99,14 +99,14 @@ std::string to_csv(const DataTable& table) {
   return csv;
 }
 
-std::string to_json(const DataTable& table) {
+Json json_of(const DataTable& table) {
   Json rows = Json::array();
   for (const auto& row : table.rows) {
     Json object;
     for (std::size_t c = 0; c < row.size(); ++c) object[table.columns[c]] = json_field(row[c]);
     rows.push_back(std::move(object));
   }
-  return rows.dump();
+  return rows;
 }
 
 }  // namespace pade::evaluation

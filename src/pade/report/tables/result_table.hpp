@@ -9,6 +9,8 @@
 #include <variant>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 namespace pade::evaluation {
 
 /// For people: everything is text already.
@@ -39,6 +41,6 @@ struct DataTable {
 
 std::string to_csv(const DataTable& table);
 /// An array with one object per row.
-std::string to_json(const DataTable& table);
+nlohmann::ordered_json json_of(const DataTable& table);
 
 }  // namespace pade::evaluation

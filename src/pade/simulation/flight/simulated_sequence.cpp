@@ -36,7 +36,6 @@ constexpr int kRendererRevision = 3;
 /// Everything that decides the bytes of the sequence, as text.
 std::string record(const Scene& scene, const Flight& flight, const FlightCamera& camera,
                    const SequenceOptions& options) {
-  const auto json = [](const auto& values) { return nlohmann::ordered_json::parse(io::to_json(values)); };
   nlohmann::ordered_json points = nlohmann::ordered_json::array();
   for (const Waypoint& w : flight.waypoints)
     points.push_back(row(w.position) + fmt::format(" {:.17g} {:.17g}", w.yaw, w.time.value_or(-1)));
@@ -70,9 +69,9 @@ std::string record(const Scene& scene, const Flight& flight, const FlightCamera&
         {"distortion", c.coefficients},
         {"translation", row(camera.T_body_camera.translation)},
         {"rotation", row(rotation_log(camera.T_body_camera.rotation))}}},
-      {"image", json(flight.image)},
-      {"sensors", json(flight.sensors)},
-      {"render", json(options.render)},
+      {"image", io::json_of(flight.image)},
+      {"sensors", io::json_of(flight.sensors)},
+      {"render", io::json_of(options.render)},
       {"seed", options.seed},
       {"every", options.every},
       {"save_flow", options.save_flow}};

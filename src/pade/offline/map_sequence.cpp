@@ -1,4 +1,4 @@
-#include "pade/pipeline/map_sequence.hpp"
+#include "pade/offline/map_sequence.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "pade/checks/run_hints.hpp"
 #include "pade/core/option_check.hpp"
@@ -18,8 +19,8 @@
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
-#include "pade/pipeline/poses_from_sensors.hpp"
-#include "pade/pipeline/run_tally.hpp"
+#include "pade/offline/poses_from_sensors.hpp"
+#include "pade/offline/run_tally.hpp"
 #include "pade/report/report.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
 
@@ -179,7 +180,7 @@ class Run {
     info.version = version;
     info.sequence = io::absolute_path(sequence_.folder()).lexically_normal();
     info.poses = sequence_.pose_file().filename().string();
-    info.options = io::to_json(options_);
+    info.options = io::json_of(options_).dump();
     info.camera = sequence_.camera();
     info.window = options_.mapper.depth.window;
     info.range_limit = options_.mapper.depth.range;

@@ -6,7 +6,7 @@
 #include "pade/core/frame.hpp"
 #include "pade/core/result.hpp"
 #include "pade/io/sequence/sequence.hpp"
-#include "pade/pipeline/map_sequence.hpp"
+#include "pade/offline/map_sequence.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 
 namespace pade {

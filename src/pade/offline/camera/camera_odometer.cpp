@@ -1,4 +1,4 @@
-#include "pade/pipeline/camera/camera_odometer.hpp"
+#include "pade/offline/camera/camera_odometer.hpp"
 
 #include <cmath>
 #include <limits>

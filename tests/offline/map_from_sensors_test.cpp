@@ -15,10 +15,10 @@
 #include <unistd.h>
 
 #include "pade/evaluation/navigation_score.hpp"
-#include "pade/pipeline/camera/camera_feedback.hpp"
-#include "pade/pipeline/checked_log.hpp"
-#include "pade/pipeline/map_sequence.hpp"
-#include "pade/pipeline/poses_from_sensors.hpp"
+#include "pade/offline/camera/camera_feedback.hpp"
+#include "pade/offline/checked_log.hpp"
+#include "pade/offline/map_sequence.hpp"
+#include "pade/offline/poses_from_sensors.hpp"
 #include "pade/simulation/flight/simulated_sequence.hpp"
 
 namespace pade {

@@ -1,4 +1,4 @@
-#include "pade/pipeline/map_replay.hpp"
+#include "pade/offline/map_replay.hpp"
 
 #include "pade/io/atomic_output.hpp"
 

@@ -1,4 +1,4 @@
-#include "pade/pipeline/map_sequence.hpp"
+#include "pade/offline/map_sequence.hpp"
 
 #include <filesystem>
 #include <fstream>

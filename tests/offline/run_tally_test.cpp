@@ -1,5 +1,5 @@
 // What a run counts for its hints: depths, and how the camera moved.
-#include "pade/pipeline/run_tally.hpp"
+#include "pade/offline/run_tally.hpp"
 
 #include <cmath>
 #include <limits>

@@ -5,9 +5,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "pade/io/options_json.hpp"
-#include "pade/pipeline/map_sequence.hpp"
+#include "pade/offline/map_sequence.hpp"
 
 namespace pade {
 namespace {
@@ -60,11 +61,11 @@ TEST(MapOptions, AConfigurationThatMakesNoSenseIsRefusedAndChangesNothing) {
         std::pair{"navigation: {filter: {soft_gate: 0}}", "option navigation.filter.soft_gate is 0"},
         std::pair{"sequence: {mask_growth: -1}", "option sequence.mask_growth is -1"}}) {
     MapSequenceOptions options;
-    const std::string before = io::to_json(options);
+    const std::string before = io::json_of(options).dump();
     const Status status = read_options(text, "c.yaml", options);
     ASSERT_FALSE(status) << text;
     EXPECT_THAT(status.error().message, HasSubstr("c.yaml: " + std::string(named)));
-    EXPECT_EQ(io::to_json(options), before);
+    EXPECT_EQ(io::json_of(options).dump(), before);
   }
 }
 
@@ -85,10 +86,10 @@ TEST(MapOptions, WhatIsEchoedReadsBackToTheSame) {
   options.navigation.history = 3;
   options.mapper.depth.far = std::numeric_limits<double>::infinity();
   options.cloud.spacing = 0.125;
-  const std::string echoed = io::to_json(options);
+  const std::string echoed = io::json_of(options).dump();
   MapSequenceOptions back;
   ASSERT_TRUE(read_options(echoed, "run.json", back));
-  EXPECT_EQ(io::to_json(back), echoed);
+  EXPECT_EQ(io::json_of(back).dump(), echoed);
 }
 
 }  // namespace

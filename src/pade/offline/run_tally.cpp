@@ -1,4 +1,4 @@
-#include "pade/pipeline/run_tally.hpp"
+#include "pade/offline/run_tally.hpp"
 
 #include <algorithm>
 #include <cmath>

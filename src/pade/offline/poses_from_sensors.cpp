@@ -1,12 +1,12 @@
-#include "pade/pipeline/poses_from_sensors.hpp"
+#include "pade/offline/poses_from_sensors.hpp"
 
 #include <algorithm>
 #include <functional>
 
 #include <fmt/format.h>
 
-#include "pade/pipeline/camera/camera_feedback.hpp"
-#include "pade/pipeline/checked_log.hpp"
+#include "pade/offline/camera/camera_feedback.hpp"
+#include "pade/offline/checked_log.hpp"
 
 namespace pade {
 namespace {

@@ -1,4 +1,4 @@
-#include "pade/pipeline/checked_log.hpp"
+#include "pade/offline/checked_log.hpp"
 
 #include <algorithm>
 #include <utility>

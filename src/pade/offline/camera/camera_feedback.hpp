@@ -7,7 +7,7 @@
 #include "pade/core/sensors/navigation_log.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/navigation/navigation_run.hpp"
-#include "pade/pipeline/camera/camera_odometer.hpp"
+#include "pade/offline/camera/camera_odometer.hpp"
 
 namespace pade {
 

@@ -1,4 +1,4 @@
-#include "pade/pipeline/camera/camera_feedback.hpp"
+#include "pade/offline/camera/camera_feedback.hpp"
 
 #include <algorithm>
 #include <cmath>
