@@ -41,6 +41,13 @@ struct CameraOptions {
   }
 };
 
+/// A flight may be long and over new ground: what is far from the vehicle is packed.
+inline ObstacleMapperOptions mapper_of_long_flights() {
+  ObstacleMapperOptions options;
+  options.map.pack_beyond = 50;
+  return options;
+}
+
 /// All of it.
 struct LiveOptions {
   CameraOptions camera;
@@ -48,7 +55,7 @@ struct LiveOptions {
   navigation::NavigatorOptions navigator;  ///< of our own filter (link.poses: sensors)
   SessionOptions session;
   SectorOptions sectors;
-  ObstacleMapperOptions mapper;
+  ObstacleMapperOptions mapper = mapper_of_long_flights();
   std::string map = "map.bt";  ///< where the map is saved; empty: nowhere
   double autosave = 10;        ///< s between one save and the next; 0: only at the end
   std::string record;          ///< MCAP file of what is mapped; empty: none

@@ -39,6 +39,7 @@ struct OccupancyMap::Scratch {
   std::optional<FreeAges> ages;
   int view = 0;               // places at least the baseline apart, so far
   Eigen::Vector3d place;      // of the last of them
+  std::optional<VoxelKey> packed_at;  // the camera's voxel when what is far was packed last
   bool is_new_place = false;  // this image is from the next one
 };
 
@@ -86,6 +87,8 @@ Status check(const MapOptions& o) {
   if (!(o.looks_baseline >= 0)) return out_of_range("looks_baseline", o.looks_baseline, "at least 0");
   if (!(o.forget_after == 0 || (o.forget_after >= 0.01 && o.forget_after <= 1e6)))
     return out_of_range("forget_after", o.forget_after, "0, or 0.01 to 1000000 s");
+  if (!(o.pack_beyond == 0 || (o.pack_beyond >= 1 && o.pack_beyond <= 1e6)))
+    return out_of_range("pack_beyond", o.pack_beyond, "0, or 1 to 1000000 m");
   if (!(o.hit_max_relative_sigma >= 0 && o.hit_max_relative_sigma <= 0.5)) {
     return out_of_range("hit_max_relative_sigma", o.hit_max_relative_sigma, "0 to 0.5");
   }
@@ -197,6 +200,19 @@ void OccupancyMap::arrive_at(const Eigen::Vector3d& place) {
   if (s.view % 4 == 0) s.pending.forget_before(s.view - kViewsUntilForgotten);
 }
 
+/// Not each time: where nothing moves there is nothing to pack.
+void OccupancyMap::pack_far(const Eigen::Vector3d& place) {
+  VoxelKey here;
+  if (options_.pack_beyond == 0 || !key_of(place, 1 / options_.voxel, here)) return;
+  constexpr int kStep = kPackedSide / 2;
+  bool moved = !scratch_->packed_at;
+  for (std::size_t axis = 0; axis < 3 && !moved; ++axis)
+    moved = std::abs(int{here[axis]} - int{(*scratch_->packed_at)[axis]}) >= kStep;
+  if (!moved) return;
+  scratch_->packed_at = here;
+  voxels_->pack_beyond(here, options_.pack_beyond / options_.voxel);
+}
+
 /// Keeps the view for the images to come, in place of the oldest.
 void OccupancyMap::remember_view() {
   Scratch& s = *scratch_;
@@ -225,6 +241,7 @@ MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera,
   }
   voxels_->apply(scratch_->free, scratch_->hits, change);
   remember_view();
+  pack_far(T_world_camera.translation);
   return change;
 }
 

@@ -41,6 +41,10 @@ struct MapOptions {
                                 ///< that confirm a far or uncertain hit, m; 0 = one look is enough
   double forget_after =
       0;  ///< free voxels that are not seen free for so long are unknown again, s; 0 = never
+  /// What is farther from the camera is kept packed, in about a tenth of the memory, until the vehicle comes back
+  /// or somebody asks for it; nothing else changes. Then const functions too must not run side by side. m; 0 =
+  /// never
+  double pack_beyond = 0;
   double hit_max_relative_sigma = 0.25;  ///< depths with sigma above this share of Z place no obstacle
   double hit_near = 8;                   ///< hits at this depth and beyond wait for a second look, m
   double hit_min_share = 0.05;           ///< of the pixels that a voxel covers in the image, to count as hit
@@ -63,6 +67,9 @@ struct MapOptions {
           "enough");
     field("forget_after", self.forget_after,
           "free voxels that are not seen free for so long are unknown again, s; 0 = never");
+    field("pack_beyond", self.pack_beyond,
+          "what is farther from the camera is kept packed, in less memory and with the same content, m; 0 = "
+          "never");
     field("hit_max_relative_sigma", self.hit_max_relative_sigma,
           "depths with sigma above this share of Z place no obstacle");
     field("hit_near", self.hit_near, "hits at this depth and beyond wait for a second look, m");
@@ -187,7 +194,7 @@ class OccupancyMap {
   /// A tree of OctoMap's with the same content, made anew: for what OctoMap, dynamicEDT3D and FCL do with
   /// one.
   [[nodiscard]] std::unique_ptr<octomap::OcTree> octree() const;
-  /// Bytes of memory that the voxels take.
+  /// Bytes of memory that the voxels take, packed ones included.
   [[nodiscard]] std::size_t memory() const;
 
   /// For the room's own searches.
@@ -201,6 +208,7 @@ class OccupancyMap {
   void believe_hits(MapChange& change);
   void find_free(MapChange& change);
   void arrive_at(const Eigen::Vector3d& place);
+  void pack_far(const Eigen::Vector3d& place);
   void remember_view();
 
   MapOptions options_;

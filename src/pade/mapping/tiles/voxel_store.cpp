@@ -45,7 +45,9 @@ VoxelStore::VoxelStore(const LogOdds& rules, double voxel) : rules_(rules), voxe
 const VoxelStore::Entry& VoxelStore::find(std::uint64_t code, unsigned depth) const {
   const Entry* entry = &root_[code >> bits_below(kRootDepth)];
   for (unsigned d = kRootDepth; d < depth && entry->has_parts(); d += 3) {
-    entry = &(*nodes_[entry->part])[code >> bits_below(d + 3) & 511U];
+    Entry& part = (*nodes_[entry->part])[code >> bits_below(d + 3) & 511U];
+    if (part.is_packed()) unpack(part);
+    entry = &part;
   }
   return *entry;
 }
@@ -80,10 +82,10 @@ std::uint64_t VoxelStore::count_least(std::uint64_t code, unsigned depth) const 
 
 std::size_t VoxelStore::memory() const {
   return tiles_.size() * kTilesOfABlock * sizeof(VoxelTile) + nodes_.size() * sizeof(Node) +
-         root_.size() * sizeof(Entry);
+         root_.size() * sizeof(Entry) + packed_bytes_;
 }
 
-std::uint32_t VoxelStore::new_tile() {
+std::uint32_t VoxelStore::new_tile() const {
   if (spare_tiles_.empty()) {
     const auto first = static_cast<std::uint32_t>(tiles_.size() * kTilesOfABlock);
     tiles_.push_back(std::make_unique<VoxelTile[]>(kTilesOfABlock));  // NOLINT(*-avoid-c-arrays)
@@ -94,7 +96,7 @@ std::uint32_t VoxelStore::new_tile() {
   return number;
 }
 
-std::uint32_t VoxelStore::new_node(const Entry& all) {
+std::uint32_t VoxelStore::new_node(const Entry& all) const {
   if (spare_nodes_.empty()) {
     spare_nodes_.push_back(static_cast<std::uint32_t>(nodes_.size()));
     nodes_.push_back(std::make_unique<Node>());
@@ -105,7 +107,8 @@ std::uint32_t VoxelStore::new_node(const Entry& all) {
   return number;
 }
 
-void VoxelStore::free_parts(Entry& entry, unsigned depth) {
+void VoxelStore::free_parts(Entry& entry, unsigned depth) const {
+  if (entry.is_packed()) release_packed(entry);
   if (!entry.has_parts()) return;
   if (depth == kTileDepth) {
     spare_tiles_.push_back(entry.part);
@@ -124,10 +127,10 @@ void VoxelStore::fill(VoxelTile& tile, float log_odds) const {
 }
 
 VoxelTile& VoxelStore::opened_tile(Entry& entry) {
-  if (entry.has_parts()) return tile(entry);
+  if (entry.has_parts()) return own_tile(entry);
   const Entry old = entry;
   entry.part = new_tile();
-  VoxelTile& made = tile(entry);
+  VoxelTile& made = own_tile(entry);
   if (old.part == Entry::kUniform) {
     fill(made, old.value);
   } else {
@@ -137,13 +140,14 @@ VoxelTile& VoxelStore::opened_tile(Entry& entry) {
 }
 
 VoxelStore::Node& VoxelStore::opened_node(Entry& entry) {
+  if (entry.is_packed()) unpack(entry);
   if (!entry.has_parts()) entry = {new_node(entry), 0};
   return *nodes_[entry.part];
 }
 
 /// Makes the parts of `entry` one where they are all the same, as `part` is.
 void VoxelStore::join(Entry& entry, unsigned depth, const Entry& part) {
-  if (part.has_parts()) return;
+  if (part.has_parts() || part.is_packed()) return;
   const Entry same = part;
   const Node& node = *nodes_[entry.part];
   if (!std::all_of(node.begin(), node.end(), [&](const Entry& other) { return other == same; })) return;
@@ -156,6 +160,7 @@ template <class Update>
 void VoxelStore::descend(Entry& entry, unsigned depth, std::uint64_t code, unsigned to,
                          const Update& update) {
   if (depth == to) {
+    if (entry.is_packed()) unpack(entry);
     update(entry);
     return;
   }
@@ -228,6 +233,7 @@ void VoxelStore::update_tile(Entry& entry, const FreeCube& free, std::span<const
 
 /// A miss for all voxels of an entry. @return whether it changed anything
 bool VoxelStore::miss_all(Entry& entry, std::uint64_t code, unsigned depth, MapChange& change) {
+  if (entry.is_packed()) unpack(entry);
   if (is_least(entry)) return false;
   if (!entry.has_parts()) {
     const bool was_free = entry.part == Entry::kUniform && !is_occupied(entry.value);

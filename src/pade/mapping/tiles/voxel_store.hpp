@@ -50,16 +50,21 @@ struct VoxelTile {
   }
 };
 
+/// Side of the cubes that are packed, voxels.
+inline constexpr int kPackedSide = 64;
+
 /// All voxels of a map.
 class VoxelStore {
  public:
-  /// What is below a node: nothing, one state all over, or parts.
+  /// What is below a node: nothing, one state all over, or parts, which may be packed.
   struct Entry {
     static constexpr std::uint32_t kUnknown = 0xffffffff;
     static constexpr std::uint32_t kUniform = 0xfffffffe;
-    std::uint32_t part = kUnknown;  ///< or the number of the node or tile
+    static constexpr std::uint32_t kPacked = 0x80000000;
+    std::uint32_t part = kUnknown;  ///< or the number of the node or tile, or kPacked + that of the bytes
     float value = 0;                ///< log-odds, if uniform
-    [[nodiscard]] bool has_parts() const { return part < kUniform; }
+    [[nodiscard]] bool has_parts() const { return part < kPacked; }
+    [[nodiscard]] bool is_packed() const { return part >= kPacked && part < kUniform; }
     bool operator==(const Entry& other) const = default;
   };
   using Node = std::array<Entry, 512>;  ///< in Morton order
@@ -69,7 +74,7 @@ class VoxelStore {
   [[nodiscard]] const LogOdds& rules() const { return rules_; }
   [[nodiscard]] bool empty() const { return empty_; }
 
-  /// The entry of the smallest cube that is at this depth or above: 4, 7, 10 or 13 = a tile.
+  /// The entry of the smallest cube that is at this depth or above: 4, 7, 10 or 13 = a tile. Unpacks.
   [[nodiscard]] const Entry& find(std::uint64_t code, unsigned depth) const;
   [[nodiscard]] const VoxelTile& tile(const Entry& entry) const {
     return tiles_[entry.part >> 8U][entry.part & 255U];
@@ -99,11 +104,18 @@ class VoxelStore {
   void for_each(const Visitor& visitor) const {
     leaves_of(root_, 0, 0, visitor);
   }
-  /// Of memory, in bytes.
+  /// Packs what is farther from a point than `distance`, by cubes of kPackedSide voxels to a side. What is asked
+  /// for, or changes, is unpacked again; to the last bit it is what it was.
+  /// @param voxel  coordinates of the point's voxel. @param distance  in voxels
+  void pack_beyond(const VoxelKey& voxel, double distance);
+  /// Of memory, in bytes: of what is not packed with what stands ready for more, and of what is packed.
   [[nodiscard]] std::size_t memory() const;
+  [[nodiscard]] std::size_t packed_memory() const { return packed_bytes_; }
 
  private:
-  static constexpr unsigned kRootDepth = 4;  // of the root's entries
+  static constexpr unsigned kRootDepth = 4;   // of the root's entries
+  static constexpr unsigned kPackDepth = 10;  // of what is packed
+  using Bytes = std::vector<std::uint8_t>;
 
   template <class Visitor>
   void leaves_of(std::span<const Entry> entries, std::uint64_t code, unsigned depth,
@@ -111,14 +123,25 @@ class VoxelStore {
   template <class Visitor>
   void leaves_of(const VoxelTile& tile, std::uint64_t code, const Visitor& visitor) const;
 
-  std::uint32_t new_tile();
-  std::uint32_t new_node(const Entry& all);
-  void free_parts(Entry& entry, unsigned depth);
-  VoxelTile& tile(const Entry& entry) { return tiles_[entry.part >> 8U][entry.part & 255U]; }
+  std::uint32_t new_tile() const;
+  std::uint32_t new_node(const Entry& all) const;
+  void free_parts(Entry& entry, unsigned depth) const;
+  /// Of voxel_packing.cpp.
+  void pack_parts(std::span<Entry> entries, std::uint64_t code, unsigned depth, const VoxelKey& voxel,
+                  double distance);
+  [[nodiscard]] Bytes packed(const Node& node) const;
+  void unpack(Entry& entry) const;
+  void unpack_node(const Bytes& bytes, Node& node) const;
+  Bytes release_packed(const Entry& entry) const;
+  [[nodiscard]] VoxelTile& own_tile(const Entry& entry) const {
+    return tiles_[entry.part >> 8U][entry.part & 255U];
+  }
   VoxelTile& opened_tile(Entry& entry);
   Node& opened_node(Entry& entry);
   void join(Entry& entry, unsigned depth, const Entry& part);
   void fill(VoxelTile& tile, float log_odds) const;
+  /// The masks of a tile from its log-odds and what is known.
+  void mark(VoxelTile& tile) const;
   [[nodiscard]] float added(float log_odds, float change) const;
 
   template <class Update>
@@ -133,9 +156,13 @@ class VoxelStore {
   double voxel_;
   bool empty_ = true;
   std::vector<Entry> root_;  // 4096
-  std::vector<std::unique_ptr<Node>> nodes_;
-  std::vector<std::unique_ptr<VoxelTile[]>> tiles_;  // 256 each NOLINT(*-avoid-c-arrays)
-  std::vector<std::uint32_t> spare_nodes_, spare_tiles_;
+  // Asking unpacks: what a const function says is the same before and after, where it is kept is not.
+  mutable std::vector<std::unique_ptr<Node>> nodes_;
+  mutable std::vector<std::unique_ptr<VoxelTile[]>> tiles_;  // 256 each NOLINT(*-avoid-c-arrays)
+  mutable std::vector<std::uint32_t> spare_nodes_, spare_tiles_;
+  mutable std::vector<Bytes> packed_;
+  mutable std::vector<std::uint32_t> spare_packed_;
+  mutable std::size_t packed_bytes_ = 0;
 };
 
 template <class Visitor>
@@ -143,7 +170,7 @@ void VoxelStore::leaves_of(std::span<const Entry> entries, std::uint64_t code, u
                            const Visitor& visitor) const {
   // Entries of one cube, at most the 4096 of all or the 512 of a node: one leaf if they are the same.
   const Entry& first = entries.front();
-  bool same = !first.has_parts();
+  bool same = !first.has_parts() && !first.is_packed();
   for (std::size_t i = 1; same && i < entries.size(); ++i) same = entries[i] == first;
   if (same) {
     if (first.part == Entry::kUniform) visitor(code, depth, first.value);
@@ -158,6 +185,11 @@ void VoxelStore::leaves_of(std::span<const Entry> entries, std::uint64_t code, u
   }
   if (depth == kTileDepth) {
     leaves_of(tile(first), code, visitor);
+  } else if (first.is_packed()) {  // a walk over all leaves it packed
+    Entry open{new_node({}), 0};
+    unpack_node(packed_[first.part - Entry::kPacked], *nodes_[open.part]);
+    leaves_of(*nodes_[open.part], code, depth, visitor);
+    free_parts(open, depth);
   } else {
     leaves_of(*nodes_[first.part], code, depth, visitor);
   }
