@@ -37,8 +37,9 @@ std::vector<std::uint8_t> framed(Bytes bytes) {
       for (unsigned shift = 64; shift > 0; shift -= 8)
         stream.push_back(static_cast<std::uint8_t>(stamp >> (shift - 8) & 0xffU));
       const std::size_t header = stream.size();
-      stream.insert(stream.end(), {kStart2, static_cast<std::uint8_t>(length), 0, 0, sequence++, 1, 1,
-                                   static_cast<std::uint8_t>(id & 0xffU), static_cast<std::uint8_t>(id >> 8U), 0});
+      stream.insert(stream.end(),
+                    {kStart2, static_cast<std::uint8_t>(length), 0, 0, sequence++, 1, 1,
+                     static_cast<std::uint8_t>(id & 0xffU), static_cast<std::uint8_t>(id >> 8U), 0});
       stream.insert(stream.end(), bytes.begin() + 4, bytes.begin() + 4 + static_cast<std::ptrdiff_t>(length));
       Checksum checksum;
       for (std::size_t i = header + 1; i < stream.size(); ++i) checksum.add(stream[i]);

@@ -1,5 +1,5 @@
-// What noise of 5 % of the depth, with its sigma known, does to the map, beside OctoMap with its defaults on the
-// same depth: solids that are marked free, obstacles that are there, the volume that is known.
+// What noise of 5 % of the depth, with its sigma known, does to the map, beside OctoMap with its defaults on
+// the same depth: solids that are marked free, obstacles that are there, the volume that is known.
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -120,7 +120,8 @@ TEST_P(NoisyMap, LeavesSolidsUnfreedAndLosesNoObstacle) {
   const NoisyQuality own = ours(flight);
   const NoisyQuality theirs = octomaps(flight);
   std::printf(
-      "%s: free voxels in solids %.3f %% (OctoMap %.3f), surface recalled %.2f %% (%.2f), known volume %.1f m3 "
+      "%s: free voxels in solids %.3f %% (OctoMap %.3f), surface recalled %.2f %% (%.2f), known volume %.1f "
+      "m3 "
       "(%.1f): %.1f %%\n",
       GetParam().c_str(), 100 * own.solid_free, 100 * theirs.solid_free, 100 * own.recalled,
       100 * theirs.recalled, own.volume, theirs.volume, 100 * own.volume / theirs.volume);

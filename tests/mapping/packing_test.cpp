@@ -23,13 +23,16 @@ struct KeptLeaf {
 
 std::vector<KeptLeaf> leaves(const VoxelStore& store) {
   std::vector<KeptLeaf> all;
-  store.for_each([&](std::uint64_t code, unsigned depth, float value) { all.push_back({code, depth, value}); });
+  store.for_each([&](std::uint64_t code, unsigned depth, float value) {
+    all.push_back({code, depth, value});
+  });
   return all;
 }
 
 constexpr int kExtent = 300;  // voxels, about the centre
 
-/// Updates as images bring them, drawn about a place: tiles and larger cubes that are free, voxels that are hit.
+/// Updates as images bring them, drawn about a place: tiles and larger cubes that are free, voxels that are
+/// hit.
 class DrawnUpdates {
  public:
   explicit DrawnUpdates(std::uint64_t seed) : random_(seed) {}
@@ -40,7 +43,8 @@ class DrawnUpdates {
     for (int i = 0; i < 40; ++i) {
       FreeCube cube;
       cube.code = morton_code(place()) & ~(voxels_of(kTileDepth) - 1);
-      for (std::uint64_t& word : cube.voxels) word = drawn(3) == 0 ? ~std::uint64_t{0} : random_() & random_();
+      for (std::uint64_t& word : cube.voxels)
+        word = drawn(3) == 0 ? ~std::uint64_t{0} : random_() & random_();
       cubes[cube.code] = cube;
     }
     if (drawn(4) == 0) {  // 16 voxels to a side, in place of the tiles in it
@@ -124,7 +128,8 @@ INSTANTIATE_TEST_SUITE_P(Seeds, Packing, testing::Range<std::uint64_t>(1, 7));
 
 /// A flight past a scene, there and back, whose images are mapped with what is far packed and without.
 TEST(PackedMap, IsTheMapAndMuchSmaller) {
-  const auto flight = *simulation::make_analytic_flight("courtyard", 8, simulation::analytic_camera(160, 120));
+  const auto flight =
+      *simulation::make_analytic_flight("courtyard", 8, simulation::analytic_camera(160, 120));
   MapOptions options;
   OccupancyMap plain = std::move(OccupancyMap::create(options)).value();
   options.pack_beyond = 1;

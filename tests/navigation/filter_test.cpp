@@ -112,7 +112,7 @@ TEST(Filter, KeepsASymmetricPositiveCovarianceThroughAnything) {
     filter.update(GnssVelocity{filter.state().time, 10 * random.normal3(), Matrix3d::Zero()});
     filter.update(ZeroVelocity{filter.state().time, 0});
     filter.update(Heading{filter.state().time, random.uniform(-9, 9), 1e-9});
-    if (i % 100 == 0) filter.add_gap_noise(1);
+    if (i % 100 == 0) filter.add_gap_noise(0, 1);
     expect_covariance(filter.covariance());
     ASSERT_TRUE(filter.state().X.p.allFinite());
   }

@@ -148,8 +148,7 @@ ordered_json record_of(const FleetOptions& options) {
     made["goal"] = row(options.place.goal);
   }
   made["flier"] = to_name(options.flier);
-  made["options"] =
-      options.flier == Flier::chain ? io::json_of(options.chain) : io::json_of(options.exact);
+  made["options"] = options.flier == Flier::chain ? io::json_of(options.chain) : io::json_of(options.exact);
   return made;
 }
 

@@ -12,8 +12,8 @@
 
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/text.hpp"
-#include "pade/paper/verdicts/flight_verdict.hpp"
 #include "pade/offline/depth_from.hpp"
+#include "pade/paper/verdicts/flight_verdict.hpp"
 
 #include "../progress.hpp"
 #include "fleet.hpp"

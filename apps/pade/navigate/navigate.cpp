@@ -101,7 +101,26 @@ Status set_mounting(const NavigateArguments& arguments, NavigationRunOptions& op
   return {};
 }
 
+/// What the parser lets through although it is no number.
+Status check_numbers(const NavigateArguments& arguments) {
+  for (const auto& [option, value] : {std::pair{"--rate", arguments.rate},
+                                      {"--heading", arguments.heading},
+                                      {"--heading-sigma", arguments.heading_sigma},
+                                      {"--gravity", arguments.gravity},
+                                      {"--declination", arguments.declination},
+                                      {"--gnss-latency", arguments.gnss_latency},
+                                      {"--gnss-velocity-latency", arguments.velocity_latency},
+                                      {"--baro-latency", arguments.barometer_latency},
+                                      {"--mag-latency", arguments.magnetometer_latency}}) {
+    if (!std::isfinite(value)) return Error{fmt::format("{}: found {}, expected a number", option, value)};
+  }
+  if (!(arguments.heading_sigma > 0))
+    return Error{fmt::format("--heading-sigma: found {}, expected degrees above 0", arguments.heading_sigma)};
+  return {};
+}
+
 Result<NavigationRunOptions> run_options(const NavigateArguments& arguments, const NavigationLog& log) {
+  if (const Status numbers = check_numbers(arguments); !numbers) return numbers.error();
   NavigationRunOptions options;
   options.rate = arguments.rate;
   options.on_road = arguments.vehicle == "road";
@@ -129,6 +148,7 @@ Result<NavigationRunOptions> run_options(const NavigateArguments& arguments, con
     if (!stamps) return stamps.error();
     options.frames = std::move(*stamps);
   }
+  if (const Status sensible = navigation::check(options.navigator); !sensible) return sensible.error();
   return options;
 }
 
@@ -262,9 +282,17 @@ Status navigate(const NavigateArguments& arguments) {
   auto options = run_options(arguments, *log);
   if (!options) return options.error();
   if (*raw) options->raw = (*raw)->epochs;
+  check_with_latencies(*checked, options->navigator);
   const NavigationRun run = run_navigation(*log, *options);
   if (run.frames.empty()) return never_aligned(arguments.log, *checked, run);
-  const std::vector<Hint> hints = all_hints(*checked, run);
+  std::vector<Hint> hints = all_hints(*checked, run);
+  if (arguments.raw_coupling == "tight" && run.raw.ranges.used == 0) {
+    hints.insert(
+        hints.begin(),
+        Hint{"raw-unused", HintSeverity::error,
+             "the filter has used no pseudorange: what it says is the IMU's alone",
+             "see that the raw GNSS has observations and satellites' messages of the hours of the IMU"});
+  }
   const Score score = score_motions(*log, *options, run);
   nlohmann::ordered_json json = summary(run, score, hints);
   json["remarks"] = log->remarks;

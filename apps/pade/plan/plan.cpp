@@ -110,8 +110,7 @@ Result<Planned> find_route(const PlanArguments& arguments) {
 }
 
 nlohmann::ordered_json json_of(const PlanArguments& arguments, const Planned& planned) {
-  nlohmann::ordered_json json = {{"map", arguments.map},
-                                 {"options", io::json_of(arguments.options)}};
+  nlohmann::ordered_json json = {{"map", arguments.map}, {"options", io::json_of(arguments.options)}};
   json.update(route_json(planned.route));
   return json;
 }

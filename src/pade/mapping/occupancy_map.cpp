@@ -37,10 +37,10 @@ struct OccupancyMap::Scratch {
   std::size_t oldest = 0;        // of `views`
   PendingHits pending;
   std::optional<FreeAges> ages;
-  int view = 0;               // places at least the baseline apart, so far
-  Eigen::Vector3d place;      // of the last of them
+  int view = 0;                       // places at least the baseline apart, so far
+  Eigen::Vector3d place;              // of the last of them
   std::optional<VoxelKey> packed_at;  // the camera's voxel when what is far was packed last
-  bool is_new_place = false;  // this image is from the next one
+  bool is_new_place = false;          // this image is from the next one
 };
 
 namespace {

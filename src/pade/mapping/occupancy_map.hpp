@@ -41,9 +41,9 @@ struct MapOptions {
                                 ///< that confirm a far or uncertain hit, m; 0 = one look is enough
   double forget_after =
       0;  ///< free voxels that are not seen free for so long are unknown again, s; 0 = never
-  /// What is farther from the camera is kept packed, in about a tenth of the memory, until the vehicle comes back
-  /// or somebody asks for it; nothing else changes. Then const functions too must not run side by side. m; 0 =
-  /// never
+  /// What is farther from the camera is kept packed, in about a tenth of the memory, until the vehicle comes
+  /// back or somebody asks for it; nothing else changes. Then const functions too must not run side by side.
+  /// m; 0 = never
   double pack_beyond = 0;
   double hit_max_relative_sigma = 0.25;  ///< depths with sigma above this share of Z place no obstacle
   double hit_near = 8;                   ///< hits at this depth and beyond wait for a second look, m

@@ -15,6 +15,8 @@ constexpr double kMotionTiltSigma = 0.08;  // of the first level in motion, rad
 constexpr double kMotionForceDoubt = 0.3;  // m/s²
 constexpr double kRestRateSigma = 2e-3;    // of the mean rate at rest, rad/s
 constexpr double kRestForceSigma = 0.06;   // of the mean force at rest, m/s²
+constexpr double kRestVelocitySigma = 0.05;  // m/s
+constexpr double kCruise = 30;               // without turning or shaking, what a vehicle may fly at, m/s
 
 Vector3d yaw_axis(const Quaterniond& R) {
   const bool upright = std::abs((R * Vector3d::UnitX()).z()) < 0.94;
@@ -100,6 +102,32 @@ Time earlier(Time time, double seconds) {
   return Time{time.nanoseconds - Time::from_seconds(seconds).nanoseconds};
 }
 
+/// How the gyroscopes have turned from one time to a later one: axes of the later one in those of the first.
+Quaterniond turned(const Timeline& timeline, Time from, Time to) {
+  Quaterniond turn = Quaterniond::Identity();
+  Time time = from;
+  for (std::size_t i = timeline.imu.count_until(from); i < timeline.imu.size() && time < to; ++i) {
+    const ImuSample& sample = timeline.imu[i];
+    const Time until = std::min(sample.time, to);
+    turn = turn * rotation_exp(seconds_between(time, until) * sample.angular_rate);
+    time = until;
+  }
+  return turn.normalized();
+}
+
+/// The last heading that is still at hand, carried on by the gyroscopes to a time at which the attitude is R
+/// but for the yaw.
+/// @param R  with the yaw 0
+std::optional<Yaw> carried_heading(const Timeline& timeline, Time until, Time at, const Quaterniond& R,
+                                   double rate_sigma) {
+  const auto* heading = last_of<Heading>(timeline, Time{INT64_MIN}, until);
+  if (heading == nullptr) return std::nullopt;
+  const Quaterniond then = heading->time < at ? R * turned(timeline, heading->time, at).conjugate()
+                                              : R * turned(timeline, at, heading->time);
+  const double drift = rate_sigma * std::abs(seconds_between(heading->time, at));
+  return Yaw{heading->yaw - azimuth(then * yaw_axis(then)), std::hypot(heading->sigma, drift)};
+}
+
 }  // namespace
 
 std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const AlignmentOptions& options) {
@@ -135,13 +163,14 @@ std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const A
   return RestMeans{now, rate, force, options.level_time};
 }
 
-void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw_sigma) {
+void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw_sigma,
+                   double velocity_sigma) {
   NavigationState state;
   state.time = rest.time;
   state.X.R = attitude(rest.specific_force, Vector3d::UnitZ(), yaw);
   state.gyroscope_bias = rest.angular_rate;
   constexpr double kAnyTilt = 0.5;
-  BaseMatrix P = prior(filter.options(), state.X.R, kAnyTilt, yaw_sigma, 0.05);
+  BaseMatrix P = prior(filter.options(), state.X.R, kAnyTilt, yaw_sigma, velocity_sigma);
   const double rate_sigma = kRestRateSigma;
   P.diagonal().segment<3>(kGyroscopeBias).setConstant(rate_sigma * rate_sigma);
   filter.start(state, P);
@@ -164,6 +193,7 @@ Alignment::Alignment(const FilterOptions& filter, const Vector3d& lever_arm, con
 
 void Alignment::reset() {
   running_ = started_clock_ = yaw_measured_ = false;
+  begins_anew_ = true;
   best_ = 0;
 }
 
@@ -174,17 +204,23 @@ bool Alignment::start_from_rest(Timeline& timeline, Time now) {
   std::optional<Yaw> yaw;
   if (const auto* heading = last_of<Heading>(timeline, from, now)) {
     yaw = Yaw{heading->yaw, heading->sigma};
+  } else if (const auto carried =
+                 carried_heading(timeline, now, now, attitude(rest->specific_force, Vector3d::UnitZ(), 0),
+                                 bank_.front().filter.options().gyroscope_bias_sigma)) {
+    yaw = carried;
   } else if (const auto* field = last_of<MagneticField>(timeline, from, now)) {
     const Quaterniond level = attitude(rest->specific_force, Vector3d::UnitZ(), 0);
     const double north = 0.5 * std::numbers::pi - timeline.declination;
     yaw = Yaw{north - azimuth(level * field->field), options_.heading_sigma_magnetic};
   }
+  // What neither turns nor shakes may cruise: after a start in flight only a velocity says that it does not.
+  const bool known = !begins_anew_ || last_gnss(timeline, from, now, velocity_in).has_value();
   const double spacing = 2 * std::numbers::pi / static_cast<double>(bank_.size());
   for (std::size_t i = 0; i < bank_.size(); ++i) {
     bank_[i].alive = !yaw || i == 0;
     if (!bank_[i].alive) continue;
     start_at_rest(bank_[i].filter, *rest, yaw ? yaw->angle : static_cast<double>(i) * spacing,
-                  yaw ? yaw->sigma : 0.6 * spacing);
+                  yaw ? yaw->sigma : 0.6 * spacing, known ? kRestVelocitySigma : kCruise);
   }
   yaw_measured_ = yaw.has_value();
   return true;
@@ -217,19 +253,23 @@ bool Alignment::start_in_motion(Timeline& timeline, Time now) {
   const FilterOptions& filter_options = bank_.front().filter.options();
   const Vector3d up =
       last->velocity - first->velocity + Vector3d(0, 0, filter_options.gravity * increment.duration);
+  const std::optional<Yaw> yaw = carried_heading(timeline, now, first->time, attitude(increment.v, up, 0),
+                                                 filter_options.gyroscope_bias_sigma);
   const double spacing = 2 * std::numbers::pi / static_cast<double>(bank_.size());
   for (std::size_t i = 0; i < bank_.size(); ++i) {
+    bank_[i].alive = !yaw || i == 0;
+    if (!bank_[i].alive) continue;
     NavigationState state;
     state.time = time;
-    const Quaterniond R0 = attitude(increment.v, up, static_cast<double>(i) * spacing);
+    const Quaterniond R0 = attitude(increment.v, up, yaw ? yaw->angle : static_cast<double>(i) * spacing);
     state.X.R = (R0 * Quaterniond(increment.R)).normalized();
     state.X.v = last->velocity;
     const double tilt = std::hypot(kMotionTiltSigma, kMotionForceDoubt / filter_options.gravity);
     const double velocity_sigma = std::sqrt(last->covariance.trace());
-    bank_[i].filter.start(state, prior(filter_options, state.X.R, tilt, 0.6 * spacing, velocity_sigma));
-    bank_[i].alive = true;
+    bank_[i].filter.start(
+        state, prior(filter_options, state.X.R, tilt, yaw ? yaw->sigma : 0.6 * spacing, velocity_sigma));
   }
-  yaw_measured_ = false;
+  yaw_measured_ = yaw.has_value();
   return true;
 }
 
@@ -263,15 +303,15 @@ AlignmentPhase Alignment::update(Timeline& timeline, Time now) {
 void Alignment::begin_at_first_fix(const Timeline& timeline, Time until) {
   // Far from the origin the gate of the first fix would close.
   const auto fix = last_gnss(timeline, Time{INT64_MIN}, until, fix_in);
-  if (!fix) return;
+  const double variance =
+      fix ? fix->covariance.trace() : 0;  // without one the vehicle is the origin, for now
   for (Hypothesis& hypothesis : bank_) {
     if (!hypothesis.alive) continue;
     FilterSnapshot snapshot = hypothesis.filter.snapshot();
-    snapshot.state.X.p = fix->position;
+    if (fix) snapshot.state.X.p = fix->position;
     // Nor must an almost unknown position meet a barometer: it would tie height to all that moves the
-    // horizon.
-    snapshot.P.block<3, 3>(kRho, kRho) =
-        (fix->covariance.trace() + kStartDistance * kStartDistance) * Matrix3d::Identity();
+    // horizon. A first fix that comes later is believed within a second, however far it is.
+    snapshot.P.block<3, 3>(kRho, kRho) = (variance + kStartDistance * kStartDistance) * Matrix3d::Identity();
     hypothesis.filter.restore(snapshot);
   }
 }

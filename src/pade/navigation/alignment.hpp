@@ -23,7 +23,9 @@ std::optional<RestMeans> detect_rest(const Timeline& timeline, Time now, const A
 
 /// Puts a filter at rest: level from the specific force, gyroscope bias from the rate, at a yaw (azimuth of
 /// the body's x axis, or of its y axis if x is near vertical) with its uncertainty.
-void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw_sigma);
+/// @param velocity_sigma  m/s; of a body that is known to rest a small one
+void start_at_rest(Filter& filter, const RestMeans& rest, double yaw, double yaw_sigma,
+                   double velocity_sigma = 0.05);
 
 /// Azimuth of the body's x axis (y if x is within 20° of the vertical), and its standard deviation.
 struct Yaw {
@@ -63,6 +65,7 @@ class Alignment {
   bool running_ = false;
   bool started_clock_ = false;
   bool yaw_measured_ = false;
+  bool begins_anew_ = false;  ///< after a gap or a filter that gave itself up: in flight, most likely
   Time first_;
   Time last_look_;
 };

@@ -109,12 +109,14 @@ void Filter::propagate(Time to, const Vector3d& rate_mean, const Vector3d& force
   core_.smooth_rotation *= decay;
 }
 
-void Filter::add_gap_noise(double duration) {
-  const double angle = options_.gap_rate * duration;
-  const double speed = options_.gap_acceleration * duration;
-  core_.pending.noise.diagonal().head<3>().array() += angle * angle;
-  core_.pending.noise.diagonal().segment<3>(3).array() += speed * speed;
-  core_.pending.noise.diagonal().tail<3>().array() += 0.25 * speed * speed * duration * duration;
+void Filter::add_gap_noise(double from, double to) {
+  const double rate = options_.gap_rate;
+  const double acceleration = options_.gap_acceleration;
+  const double squares = to * to - from * from;
+  auto noise = core_.pending.noise.diagonal();
+  noise.head<3>().array() += rate * rate * squares;
+  noise.segment<3>(3).array() += acceleration * acceleration * squares;
+  noise.tail<3>().array() += 0.25 * acceleration * acceleration * squares * (to * to + from * from);
 }
 
 void Filter::flush() {
@@ -156,6 +158,9 @@ void Filter::flush() {
   P_.middleRows<3>(kIron) *= iron_decay;
   P_.diagonal().segment<3>(kIron).array() +=
       (1 - iron_decay * iron_decay) * options_.iron_sigma * options_.iron_sigma;
+  const Vector3d settled = core_.gnss_class.bias_sigma.cwiseAbs2();
+  core_.gnss_class.bias_variance =
+      settled + position_decay * position_decay * (core_.gnss_class.bias_variance - settled);
   core_.state.position_bias *= position_decay;
   core_.state.height_bias *= height_decay;
   core_.state.iron *= iron_decay;
@@ -234,7 +239,8 @@ Innovation Filter::update(const BarometricHeight& height) {
   flush();
   if (!core_.height_known) {  // the first reading defines the zero
     core_.height_known = true;
-    core_.state.height_bias = height.height - core_.state.X.p.z();
+    core_.state.height_zero = height.height - core_.state.X.p.z();
+    core_.state.height_bias = 0;
     P_.col(kHeightBias).setZero();
     P_.row(kHeightBias).setZero();
     P_(kHeightBias, kHeightBias) = options_.barometer_bias_sigma * options_.barometer_bias_sigma;

@@ -33,6 +33,9 @@ static_assert(kMaxState % 2 == 0);
 struct GnssErrorClass {
   Vector3d bias_sigma = Vector3d::Zero();
   double correlation_time = 0;  ///< 0: no bias known yet
+  /// That of the bias without measurements: it falls to bias_sigma² within the correlation time, so that a
+  /// sigma that goes up and down is not added up.
+  Vector3d bias_variance = Vector3d::Zero();
 };
 
 /// How much the samples of an axis differ from a smooth motion: rotor and engine vibration, which aliases
@@ -103,8 +106,9 @@ class Filter {
   void propagate(Time to, const Vector3d& rate_mean, const Vector3d& force_mean, const Vector3d& rate_end);
   /// Learns the level of vibration from a sample that the state has been moved to.
   void observe(const ImuSample& sample) { core_.vibration.observe(sample, options_.gap); }
-  /// Adds the uncertainty that a gap of `duration` without samples leaves.
-  void add_gap_noise(double duration);
+  /// Adds the uncertainty of a step within a gap without samples: the same in one step as in many.
+  /// @param from, to  since the last sample, s
+  void add_gap_noise(double from, double to);
 
   Innovation update(const GnssFix& fix);
   Innovation update(const GnssVelocity& velocity);

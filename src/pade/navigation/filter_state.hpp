@@ -41,7 +41,8 @@ struct NavigationState {
   Vector3d gyroscope_bias = Vector3d::Zero();      ///< rad/s
   Vector3d accelerometer_bias = Vector3d::Zero();  ///< m/s²
   Vector3d position_bias = Vector3d::Zero();       ///< of GNSS positions, ENU, m
-  double height_bias = 0;                          ///< of the barometer, m
+  double height_zero = 0;                          ///< of the barometer as it began, ENU, m
+  double height_bias = 0;                          ///< what that has drifted by, m
   Vector3d iron = Vector3d::Zero();          ///< field of the vehicle, body, as a share of the whole field
   Vector3d angular_rate = Vector3d::Zero();  ///< bias-corrected, at `time`, for lever arms
 

@@ -70,13 +70,13 @@ enum class SensorKind : std::uint8_t {
 
 /// A measurement of any sensor.
 struct Measurement {
-  /// As the sensor delivered it, with its own stamp. An epoch of raw GNSS is never null; a motion is null for an
-  /// image from which one may be measured.
-  using Value =
-      std::variant<GnssVelocity, GnssFix, BarometricHeight, Heading, MagneticField, ZeroVelocity, RangeToGround,
-                   RoadMotion, std::shared_ptr<const RawEpoch>, std::shared_ptr<const CameraMotion>>;
+  /// As the sensor delivered it, with its own stamp. An epoch of raw GNSS is never null; a motion is null for
+  /// an image from which one may be measured.
+  using Value = std::variant<GnssVelocity, GnssFix, BarometricHeight, Heading, MagneticField, ZeroVelocity,
+                             RangeToGround, RoadMotion, std::shared_ptr<const RawEpoch>,
+                             std::shared_ptr<const CameraMotion>>;
 
-  Time time;              ///< on the filter's time scale: the sensor's stamp less its latency
+  Time time;  ///< on the filter's time scale: the sensor's stamp less its latency
   Value value;
   Innovation innovation;  ///< of its last use by the live filter
 

@@ -59,7 +59,7 @@ inline Prediction<2> predict_road_motion(const NavigationState& state) {
 /// Barometric height: p_z + b_h.h.
 inline Prediction<1> predict_barometric_height(const NavigationState& state) {
   Prediction<1> y;
-  y.value[0] = state.X.p.z() + state.height_bias;
+  y.value[0] = state.X.p.z() + state.height_zero + state.height_bias;
   y.H.setZero();
   y.H.middleCols<3>(kRho) = state.X.R.toRotationMatrix().row(2);
   y.H(0, kHeightBias) = 1;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 
+#include "pade/core/compute/median.hpp"
 #include "pade/navigation/replay.hpp"
 
 namespace pade {
@@ -10,14 +11,36 @@ namespace {
 
 using navigation::Answer;
 
-std::vector<Time> regular_times(const NavigationLog& log, double rate) {
+/// @param longest_gap  s
+std::vector<Time> regular_times(const NavigationLog& log, double rate, double longest_gap) {
   std::vector<Time> times;
   if (log.imu.empty() || !(rate > 0)) return times;
-  const auto [first, last] = std::minmax_element(
-      log.imu.begin(), log.imu.end(), [](const ImuSample& a, const ImuSample& b) { return a.time < b.time; });
-  const auto step = Time::from_seconds(1 / rate).nanoseconds;
-  for (Time t = first->time; t <= last->time; t.nanoseconds += step) times.push_back(t);
+  std::vector<Time> stamps;
+  for (const ImuSample& sample : log.imu) stamps.push_back(sample.time);
+  std::sort(stamps.begin(), stamps.end());
+  const auto step = std::max<std::int64_t>(1, Time::from_seconds(1 / rate).nanoseconds);
+  Time t = stamps.front();
+  Time last = t;
+  for (const Time stamp : stamps) {
+    // In a gap that long, or between the two times of a clock that was set, there is nothing to say.
+    if (seconds_between(last, stamp) > longest_gap && t < stamp)
+      t.nanoseconds += (stamp.nanoseconds - t.nanoseconds + step - 1) / step * step;
+    for (; t <= stamp; t.nanoseconds += step) times.push_back(t);
+    last = stamp;
+  }
   return times;
+}
+
+/// The buffers hold what an IMU of this rate delivers.
+double rate_of(const std::vector<ImuSample>& samples) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double step = seconds_between(samples[i - 1].time, samples[i].time);
+    if (step > 0) steps.push_back(step);
+  }
+  constexpr double kReserve = 1.2;
+  constexpr double kFastest = 1e5;  // Hz
+  return steps.empty() ? 0 : std::min(kFastest, kReserve / median(steps));
 }
 
 /// The longest run of motions each of which begins where the one before ends; the first of equal ones.
@@ -50,9 +73,13 @@ void count_frames(NavigationRun& run) {
 
 NavigationRun run_navigation(const NavigationLog& log, const NavigationRunOptions& options) {
   NavigationRun run;
-  navigation::Navigator navigator(options.navigator);
+  navigation::NavigatorOptions fitting = options.navigator;
+  fitting.imu_rate = std::max(fitting.imu_rate, rate_of(log.imu));
+  navigation::Navigator navigator(fitting);
   navigator.on_retired([&run](const navigation::Measurement& m) { run.measurements.push_back(m); });
-  std::vector<Time> frames = options.frames.empty() ? regular_times(log, options.rate) : options.frames;
+  std::vector<Time> frames = options.frames.empty()
+                                 ? regular_times(log, options.rate, options.navigator.longest_gap)
+                                 : options.frames;
   std::sort(frames.begin(), frames.end());
   navigation::ReplayOptions replay;
   if (options.heading) replay.headings.push_back(*options.heading);

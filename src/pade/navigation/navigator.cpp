@@ -18,6 +18,7 @@ using Image = std::shared_ptr<const CameraMotion>;
 
 constexpr double kKeyframeInterval = 0.1;  // s
 constexpr double kYawKnown = 0.125;        // rad, about 7°
+constexpr double kMeasurementRate = 600;   // of all sensors together, Hz
 
 std::size_t capacity(double seconds, double rate) {
   return static_cast<std::size_t>(std::ceil(seconds * rate)) + 8;
@@ -82,6 +83,7 @@ class Navigator::Core {
   void replay_from(Time time);
   void restart();
   void restart_if_hopeless();
+  void retire_oldest();
   bool load_scratch(Time t, Answer& answer);
   [[nodiscard]] Time imu_time(Time image) const;
   [[nodiscard]] NavigationStatus status_of(Filter& filter) const;
@@ -104,7 +106,7 @@ class Navigator::Core {
 Navigator::Core::Core(const NavigatorOptions& options)
     : options_(options),
       timeline_(capacity(buffered_seconds(options), options.imu_rate),
-                capacity(buffered_seconds(options), 200)),
+                capacity(buffered_seconds(options), kMeasurementRate)),
       alignment_(options.filter, options.gnss_lever_arm, options.alignment),
       live_(options.filter, options.gnss_lever_arm),
       scratch_(options.filter, options.gnss_lever_arm),
@@ -180,15 +182,27 @@ void Navigator::Core::add(Time stamp, double latency, Measurement::Value value, 
     return;
   }
   const Measurement measurement(shifted(stamp, -latency), std::move(value));
+  if (has_imu_ && measurement.time > shifted(newest_, buffered_seconds(options_))) {
+    ++health_.too_new;  // they would fill the buffer and never leave it
+    return;
+  }
   const bool aligned = phase_ == AlignmentPhase::aligned;
   if (aligned && measurement.time <= keyframes_.front().time) {
     ++health_.too_late;
     return;
   }
-  const auto place = timeline_.place_of(measurement);
+  auto place = timeline_.place_of(measurement);
   if (!place) {
     ++health_.duplicates;
     return;
+  }
+  if (timeline_.measurements.full()) {
+    if (*place == 0) {
+      ++health_.too_late;
+      return;
+    }
+    retire_oldest();
+    --*place;
   }
   timeline_.measurements.insert(*place, measurement);
   if (aligned) replay_from(measurement.time);
@@ -238,13 +252,15 @@ void Navigator::Core::add(const CameraMotion& motion) {
 }
 
 void Navigator::Core::retire(Time before) {
-  while (!timeline_.measurements.empty() && timeline_.measurements.front().time < before) {
-    const Measurement& oldest = timeline_.measurements.front();
-    const auto* image = oldest.get_if<Image>();
-    const bool is_mark = image != nullptr && !*image;
-    if (sink_ && !is_mark) sink_(oldest);
-    timeline_.measurements.pop_front();
-  }
+  while (!timeline_.measurements.empty() && timeline_.measurements.front().time < before) retire_oldest();
+}
+
+void Navigator::Core::retire_oldest() {
+  const Measurement& oldest = timeline_.measurements.front();
+  const auto* image = oldest.get_if<Image>();
+  const bool is_mark = image != nullptr && !*image;
+  if (sink_ && !is_mark) sink_(oldest);
+  timeline_.measurements.pop_front();
 }
 
 Time Navigator::Core::imu_time(Time image) const { return shifted(image, options_.camera_time_offset); }
@@ -347,10 +363,10 @@ Status check(const NavigatorOptions& o) {
       {"gnss_lever_arm_x", o.gnss_lever_arm.x(), -kFar, kFar},
       {"gnss_lever_arm_y", o.gnss_lever_arm.y(), -kFar, kFar},
       {"gnss_lever_arm_z", o.gnss_lever_arm.z(), -kFar, kFar},
-      {"gnss_position_latency", o.gnss_position_latency, -10, 10},
-      {"gnss_velocity_latency", o.gnss_velocity_latency, -10, 10},
-      {"barometer_latency", o.barometer_latency, -10, 10},
-      {"magnetometer_latency", o.magnetometer_latency, -10, 10},
+      {"gnss_position_latency", o.gnss_position_latency, -100, 100},
+      {"gnss_velocity_latency", o.gnss_velocity_latency, -100, 100},
+      {"barometer_latency", o.barometer_latency, -100, 100},
+      {"magnetometer_latency", o.magnetometer_latency, -100, 100},
       {"camera_time_offset", o.camera_time_offset, -kFar, kFar},
       {"declination", o.declination, -std::numbers::pi, std::numbers::pi},
       {"history", o.history, above_zero, 60},
@@ -374,6 +390,7 @@ Navigator::Navigator(const NavigatorOptions& options) : core_(std::make_unique<C
 Navigator::Navigator(Navigator&&) noexcept = default;
 Navigator& Navigator::operator=(Navigator&&) noexcept = default;
 Navigator::~Navigator() = default;
+const NavigatorOptions& Navigator::options() const { return core_->options(); }
 
 void Navigator::add(const ImuSample& sample) { core_->add(sample); }
 void Navigator::add(const GnssFix& measurement) {
@@ -389,7 +406,8 @@ void Navigator::add(const BarometricHeight& measurement) {
              std::isfinite(measurement.height) && std::isfinite(measurement.sigma));
 }
 void Navigator::add(const Heading& measurement) {
-  core_->add(measurement.time, 0, measurement, std::isfinite(measurement.yaw) && std::isfinite(measurement.sigma));
+  core_->add(measurement.time, 0, measurement,
+             std::isfinite(measurement.yaw) && std::isfinite(measurement.sigma));
 }
 void Navigator::add(const MagneticField& measurement) {
   core_->add(measurement.time, core_->options().magnetometer_latency, measurement,

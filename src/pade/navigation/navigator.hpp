@@ -143,6 +143,8 @@ class Navigator {
 
   /// As of the newest data.
   [[nodiscard]] Health health();
+  /// As they were given.
+  [[nodiscard]] const NavigatorOptions& options() const;
   /// What became of raw GNSS, satellite by satellite, since the last start of the filter.
   [[nodiscard]] RawTally raw_tally() const;
   /// What became of the camera's motions, since the last start of the filter.

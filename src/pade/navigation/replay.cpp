@@ -27,23 +27,25 @@ void replay(const NavigationLog& log, Navigator& navigator, const ReplayOptions&
             const std::function<void(Time)>& after_imu) {
   std::vector<Arrival> arrivals;
   Random random(options.seed);
-  const auto schedule = [&](const auto& items, Kind kind, bool delayed) {
+  const NavigatorOptions& sensors = navigator.options();
+  // Each comes when it was measured, whatever its stamp: a latency of many seconds is no delay.
+  const auto schedule = [&](const auto& items, Kind kind, bool delayed, double latency) {
     for (std::size_t i = 0; i < items.size(); ++i) {
       const double delay = delayed ? random.uniform(options.gnss_delay_low, options.gnss_delay_high) : 0;
       const Time time = time_of(items[i]);
       if (time < options.from || time > options.to) continue;
-      arrivals.push_back({Time{time.nanoseconds + Time::from_seconds(delay).nanoseconds}, kind, i});
+      arrivals.push_back({Time{time.nanoseconds + Time::from_seconds(delay - latency).nanoseconds}, kind, i});
     }
   };
-  schedule(options.headings, Kind::heading, false);
-  schedule(log.gnss.velocities, Kind::velocity, true);
-  schedule(log.gnss.fixes, Kind::fix, true);
-  schedule(log.barometer, Kind::barometer, false);
-  schedule(log.magnetometer, Kind::magnetometer, false);
-  schedule(options.raw, Kind::raw, true);
+  schedule(options.headings, Kind::heading, false, 0);
+  schedule(log.gnss.velocities, Kind::velocity, true, sensors.gnss_velocity_latency);
+  schedule(log.gnss.fixes, Kind::fix, true, sensors.gnss_position_latency);
+  schedule(log.barometer, Kind::barometer, false, sensors.barometer_latency);
+  schedule(log.magnetometer, Kind::magnetometer, false, sensors.magnetometer_latency);
+  schedule(options.raw, Kind::raw, true, sensors.gnss_position_latency);
   // A log keeps the order in which its IMU was written, also where stamps go back; the Navigator judges that.
   const std::size_t aiding = arrivals.size();
-  schedule(log.imu, Kind::imu, false);
+  schedule(log.imu, Kind::imu, false, 0);
   std::stable_sort(arrivals.begin(), arrivals.begin() + static_cast<std::ptrdiff_t>(aiding),
                    [](const Arrival& a, const Arrival& b) { return a.time < b.time; });
 

@@ -1,5 +1,7 @@
 #include "pade/navigation/timeline.hpp"
 
+#include <algorithm>
+
 namespace pade::navigation {
 
 namespace {
@@ -55,7 +57,10 @@ void Timeline::step(Filter& filter, Time to, std::size_t next_sample, Time limit
                    a.angular_rate + s1 * turn);
   const bool gap =
       interval > filter.options().gap || (!has_next && seconds_between(a.time, to) > filter.options().gap);
-  if (gap) filter.add_gap_noise(seconds_between(from, to));
+  if (gap) {
+    filter.add_gap_noise(std::max(0.0, seconds_between(a.time, from)),
+                         std::max(0.0, seconds_between(a.time, to)));
+  }
 }
 
 }  // namespace pade::navigation

@@ -24,6 +24,25 @@ CheckedLog checked_log(NavigationLog log) {
   return checked;
 }
 
+void check_with_latencies(CheckedLog& checked, const navigation::NavigatorOptions& latencies) {
+  if (latencies.gnss_position_latency == 0 && latencies.gnss_velocity_latency == 0 &&
+      latencies.barometer_latency == 0 && latencies.magnetometer_latency == 0)
+    return;
+  NavigationLog log = checked.log;
+  const auto shift = [](auto& items, double latency) {
+    for (auto& item : items) item.time.nanoseconds -= Time::from_seconds(latency).nanoseconds;
+  };
+  shift(log.gnss.fixes, latencies.gnss_position_latency);
+  shift(log.gnss.velocities, latencies.gnss_velocity_latency);
+  shift(log.barometer, latencies.barometer_latency);
+  shift(log.magnetometer, latencies.magnetometer_latency);
+  std::vector<Hint> hints = navigation::check_log(log);
+  for (Hint& hint : checked.hints) {
+    if (hint.id == "imu-stamps-regularised") hints.push_back(std::move(hint));
+  }
+  checked.hints = std::move(hints);
+}
+
 std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run) {
   std::vector<Hint> hints = checked.hints;
   const auto of_run = navigation::check_run(run.health.sensors, run.health.filter, checked.log.imu.size());

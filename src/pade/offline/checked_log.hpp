@@ -22,6 +22,10 @@ struct CheckedLog {
 /// (navigation::check_log).
 CheckedLog checked_log(NavigationLog log);
 
+/// Checks it again with the sensors' latencies taken off their stamps: what was found because of them is then
+/// gone.
+void check_with_latencies(CheckedLog& checked, const navigation::NavigatorOptions& latencies);
+
 /// The same of a log folder. Errors: io::read_navigation_log.
 Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
                                     const io::NavigationLogOptions& options = {});

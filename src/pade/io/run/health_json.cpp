@@ -20,6 +20,7 @@ constexpr auto navigation_fields = [](auto& health, auto&& field) {
   field("imu_refused", filter.imu_refused, "a count");
   field("imu_gaps", filter.imu_gaps, "a count");
   field("measurements_too_late", filter.too_late, "a count");
+  field("measurements_too_new", filter.too_new, "a count");
   field("measurements_repeated", filter.duplicates, "a count");
   field("measurements_unusable", filter.unusable, "a count");
   field("restarts", filter.restarts, "a count");

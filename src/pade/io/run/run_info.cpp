@@ -258,10 +258,10 @@ Result<RunInfo> run_info_from_json(std::string_view text, std::string_view file)
 
 Json json_of(const RunTiming& timing) {
   return {{"stages", list_by(stage_fields, timing.stages)},
-                     {"frames_per_second", timing.frames_per_second},
-                     {"peak_memory_bytes", timing.peak_memory},
-                     {"cpu_seconds", timing.cpu_seconds},
-                     {"stages_cpu_seconds", timing.stages_cpu_seconds}};
+          {"frames_per_second", timing.frames_per_second},
+          {"peak_memory_bytes", timing.peak_memory},
+          {"cpu_seconds", timing.cpu_seconds},
+          {"stages_cpu_seconds", timing.stages_cpu_seconds}};
 }
 
 std::string to_json(const RunTiming& timing) { return json_of(timing).dump(2) + "\n"; }

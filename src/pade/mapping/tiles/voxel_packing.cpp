@@ -1,5 +1,5 @@
-// Parts of the map that the vehicle is far from, as bytes: what is unknown or the same all over takes one, and a
-// log-odds one or two, by its number in a list of those that occur.
+// Parts of the map that the vehicle is far from, as bytes: what is unknown or the same all over takes one,
+// and a log-odds one or two, by its number in a list of those that occur.
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -59,8 +59,9 @@ EighthKind kind_of(const VoxelTile& tile, std::size_t eighth) {
   if (known == 0) return EighthKind::unknown;
   if (~known != 0) return EighthKind::partly;
   const auto* const first = &tile.log_odds[64 * eighth];
-  return std::all_of(first, first + 64, [first](float value) { return value == *first; }) ? EighthKind::uniform
-                                                                                           : EighthKind::known;
+  return std::all_of(first, first + 64, [first](float value) { return value == *first; })
+             ? EighthKind::uniform
+             : EighthKind::known;
 }
 
 /// Calls visit(float) for each log-odds of an eighth that is written, in order.
@@ -68,12 +69,14 @@ template <class Visit>
 void for_values(VoxelTile& tile, std::size_t eighth, EighthKind kind, const Visit& visit) {
   float* const first = &tile.log_odds[64 * eighth];
   if (kind == EighthKind::uniform) return visit(*first);
-  for (std::uint64_t rest = tile.known[eighth]; rest != 0; rest &= rest - 1) visit(first[std::countr_zero(rest)]);
+  for (std::uint64_t rest = tile.known[eighth]; rest != 0; rest &= rest - 1)
+    visit(first[std::countr_zero(rest)]);
 }
 
 }  // namespace
 
-/// The values, then for each tile: what it is, the kinds of its eighths, what is known of them, their log-odds.
+/// The values, then for each tile: what it is, the kinds of its eighths, what is known of them, their
+/// log-odds.
 Bytes VoxelStore::packed(const Node& node) const {
   ValueList list;
   for (const Entry& entry : node) {
@@ -88,7 +91,8 @@ Bytes VoxelStore::packed(const Node& node) const {
   Bytes bytes;
   const auto put_number = [&](float value) {
     const std::uint32_t number = list.number_of(value);
-    for (unsigned i = 0; i < width; ++i) bytes.push_back(static_cast<std::uint8_t>(number >> (8 * i) & 0xffU));
+    for (unsigned i = 0; i < width; ++i)
+      bytes.push_back(static_cast<std::uint8_t>(number >> (8 * i) & 0xffU));
   };
   put_value(bytes, static_cast<std::uint32_t>(list.values().size()));
   for (const float value : list.values()) put_value(bytes, value);
@@ -135,7 +139,8 @@ void VoxelStore::unpack_node(const Bytes& bytes, Node& node) const {
     for (std::size_t eighth = 0; eighth < 8; ++eighth) {
       const auto kind = static_cast<EighthKind>(kinds >> (2 * eighth) & 3U);
       if (kind == EighthKind::unknown) continue;
-      made.known[eighth] = kind == EighthKind::partly ? take_value<std::uint64_t>(bytes, at) : ~std::uint64_t{0};
+      made.known[eighth] =
+          kind == EighthKind::partly ? take_value<std::uint64_t>(bytes, at) : ~std::uint64_t{0};
       for_values(made, eighth, kind, [&](float& value) { value = next_value(); });
       float* const first = &made.log_odds[64 * eighth];
       if (kind == EighthKind::uniform) std::fill(first, first + 64, *first);
@@ -172,8 +177,8 @@ void VoxelStore::unpack(Entry& entry) const {
   unpack_node(bytes, *nodes_[entry.part]);
 }
 
-void VoxelStore::pack_parts(std::span<Entry> entries, std::uint64_t code, unsigned depth, const VoxelKey& voxel,
-                            double distance) {
+void VoxelStore::pack_parts(std::span<Entry> entries, std::uint64_t code, unsigned depth,
+                            const VoxelKey& voxel, double distance) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     Entry& entry = entries[i];
     if (!entry.has_parts()) continue;

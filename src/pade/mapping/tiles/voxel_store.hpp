@@ -104,8 +104,8 @@ class VoxelStore {
   void for_each(const Visitor& visitor) const {
     leaves_of(root_, 0, 0, visitor);
   }
-  /// Packs what is farther from a point than `distance`, by cubes of kPackedSide voxels to a side. What is asked
-  /// for, or changes, is unpacked again; to the last bit it is what it was.
+  /// Packs what is farther from a point than `distance`, by cubes of kPackedSide voxels to a side. What is
+  /// asked for, or changes, is unpacked again; to the last bit it is what it was.
   /// @param voxel  coordinates of the point's voxel. @param distance  in voxels
   void pack_beyond(const VoxelKey& voxel, double distance);
   /// Of memory, in bytes: of what is not packed with what stands ready for more, and of what is packed.

@@ -77,10 +77,14 @@ Matrix3d Filter::split_position_noise(const GnssFix& fix) {
     P_.diagonal().segment<3>(kPositionBias) = sigma.cwiseAbs2();
     core_.state.position_bias.setZero();
   } else {  // a receiver that announces a larger error has one now, not in two minutes
-    const Vector3d grown = (sigma.cwiseAbs2() - known.bias_sigma.cwiseAbs2()).cwiseMax(0);
+    const Vector3d grown = (sigma.cwiseAbs2() - known.bias_variance).cwiseMax(0);
     P_.diagonal().segment<3>(kPositionBias) += grown;
   }
-  known = {sigma, tau};
+  const bool same_kind = known.correlation_time == tau;
+  known.bias_variance =
+      same_kind ? Vector3d(sigma.cwiseAbs2().cwiseMax(known.bias_variance)) : sigma.cwiseAbs2();
+  known.bias_sigma = sigma;
+  known.correlation_time = tau;
   return share * total;
 }
 
@@ -192,7 +196,7 @@ void Filter::compare_gnss(const Vector3d& position, const Matrix3d& white) {
                      std::sqrt(2 / kind.correlation_time) * kind.bias_sigma, now);
   const double agreed = agreement.agreed(now);
   integrity.ever_agreed = integrity.ever_agreed || agreed > kTrusted;
-  if (agreed > kAgreement) integrity.position_doubted = false;
+  if (agreed > kAgreement || !agreement.hears_velocities(now)) integrity.position_doubted = false;
   if (!agreement.contradicts()) return;
   integrity.raise(now);
   if (integrity.velocity_doubted || integrity.position_doubted) return;

@@ -17,6 +17,7 @@ constexpr double kSlowAverage = 7.5;  // s
 constexpr int kLeastPositions = 5;
 constexpr double kClockDoubt = 0.05;  // s, by which stamps of the two may differ
 constexpr double kSpeedMemory = 10;   // s
+constexpr double kVelocityAge = 2.5;  // s, over which nobody knows the way between two velocities
 constexpr double kOutlier = 4;        // sigmas
 constexpr double kLeastDoubt = 0.05;  // m
 constexpr double kAgreementRatio = 3;
@@ -37,7 +38,9 @@ void Dispute::advance(Time now, const Vector3d& measured, const Vector3d& predic
 }
 
 void Dispute::velocity(const Vector3d& measured, const Vector3d& predicted, Time now, bool parted) {
+  if (has_velocity_ && seconds_between(velocity_time_, now) > kVelocityAge) has_fix_ = false;
   if (has_fix_ && has_velocity_) advance(now, measured, predicted);
+  velocity_time_ = now;
   measured_ = measured;
   predicted_ = predicted;
   time_ = now;
@@ -47,6 +50,7 @@ void Dispute::velocity(const Vector3d& measured, const Vector3d& predicted, Time
 }
 
 Dispute::Ruling Dispute::position(const Vector3d& measured, double white_sigma, Time now) {
+  if (has_velocity_ && seconds_between(velocity_time_, now) > kVelocityAge) has_fix_ = false;
   if (has_velocity_ && has_fix_) advance(now, measured_, predicted_);
   fix_time_ = now;
   if (!parted_ || !has_fix_ || !has_velocity_) {
@@ -77,6 +81,10 @@ void GnssAgreement::velocity(const Vector3d& measured, const Vector3d& axes, Tim
     ratio_ = 0;
   }
   const double dt = seconds_between(time_, now);
+  if (has_velocity_ && dt > kVelocityAge) {  // a turn in the gap would look like positions led astray
+    positions_ = 0;
+    ratio_ = 0;
+  }
   if (has_velocity_) way_ += 0.5 * dt * (velocity_ + measured);
   fastest_ = std::max(measured.norm(), has_velocity_ ? fastest_ * std::exp(-dt / kSpeedMemory) : 0);
   velocity_ = measured;
@@ -87,7 +95,7 @@ void GnssAgreement::velocity(const Vector3d& measured, const Vector3d& axes, Tim
 void GnssAgreement::position(const Vector3d& measured, const Vector3d& white, const Vector3d& walk,
                              Time now) {
   if (!has_velocity_) return;
-  if (axes_.isZero(0)) {  // nothing is said, so nothing agrees either
+  if (!hears_velocities(now)) {  // nothing is said, so nothing agrees either
     positions_ = 0;
     ratio_ = 0;
     return;
@@ -124,6 +132,10 @@ void GnssAgreement::jumped(const Vector3d& shift, Time now) {
   if (on) return;
   positions_ = 0;
   ratio_ = 0;
+}
+
+bool GnssAgreement::hears_velocities(Time now) const {
+  return has_velocity_ && !axes_.isZero(0) && seconds_between(time_, now) <= kVelocityAge;
 }
 
 double GnssAgreement::agreed(Time now) const {

@@ -25,6 +25,7 @@ class Dispute {
   bool parted_ = false;
   Vector3d fix_ = Vector3d::Zero();
   Time fix_time_;                              ///< of the last one
+  Time velocity_time_;                         ///< of the last one
   Time time_;                                  ///< up to which the ways are summed
   Vector3d measured_ = Vector3d::Zero();       ///< last velocity, m/s
   Vector3d predicted_ = Vector3d::Zero();      ///< m/s
@@ -47,6 +48,8 @@ class GnssAgreement {
   void jumped(const Vector3d& shift, Time now);
 
   [[nodiscard]] bool contradicts() const { return ratio_ > kContradiction; }
+  /// Velocities come: without them nothing is compared.
+  [[nodiscard]] bool hears_velocities(Time now) const;
   /// For how long the two have agreed, s.
   [[nodiscard]] double agreed(Time now) const;
 

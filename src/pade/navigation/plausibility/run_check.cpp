@@ -124,6 +124,25 @@ std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health
     }
   }
   check_integrity(health, hints);
+  std::uint64_t judged = 0;
+  for (const SensorSummary& sensor : sensors) judged += sensor.measurements;
+  constexpr double kSomeUnused = 0.02;
+  const auto many = [&](std::uint64_t unused) {
+    return unused > 10 && static_cast<double>(unused) > kSomeUnused * static_cast<double>(judged + unused);
+  };
+  if (many(health.too_late)) {
+    say(hints, "measurements-too-late", HintSeverity::warning,
+        fmt::format("{} measurements came after the filter had gone on too far to use them ({} were used)",
+                    health.too_late, judged),
+        "check the clocks of the sensors against that of the IMU, and the latencies that are given");
+  }
+  if (many(health.too_new)) {
+    say(hints, "measurements-too-new", HintSeverity::warning,
+        fmt::format(
+            "{} measurements have stamps of many seconds after the IMU and were not used ({} were used)",
+            health.too_new, judged),
+        "check the clocks of the sensors against that of the IMU");
+  }
   return hints;
 }
 

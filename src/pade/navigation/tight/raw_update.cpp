@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kFirstClockSigma = 30;  // of a clock taken from a median of ranges, m
 constexpr double kFirstDriftSigma = 3;   // likewise, m/s
+constexpr double kUnknownDrift = 300;    // of an oscillator: 1e-6, m/s
 constexpr double kVerticalBias = 1.6;    // of the common bias, against the horizontal one
 constexpr std::size_t kLeastForFix = 4;
 // Doppler comes of the loop that follows the phase: beside a phase it is not news of its own, and counts
@@ -104,15 +105,17 @@ void Filter::start_receiver(const RawEpoch& epoch) {
     }
     const auto first =
         std::find_if(ranges.begin(), ranges.end(), [](const Median& m) { return m.count() > 0; });
-    if (first == ranges.end() || rates.count() == 0) return;
+    if (first == ranges.end()) return;
+    const bool has_rates = rates.count() > 0;  // not every receiver writes Doppler
     raw.clock_known = true;
     raw.receiver.clock += first->value();
-    raw.receiver.drift += rates.value();
+    if (has_rates) raw.receiver.drift += rates.value();
     raw.rates_agreed = raw.ranges_agreed = core_.state.time;
     set_prior(kClock, kFirstClockSigma * kFirstClockSigma);
-    set_prior(kDrift, kFirstDriftSigma * kFirstDriftSigma);
-    core_.gnss_class = {options_.raw_bias_sigma * Vector3d(1, 1, kVerticalBias),
-                        options_.single_point_correlation_time};
+    const double drift = has_rates ? kFirstDriftSigma : kUnknownDrift;
+    set_prior(kDrift, drift * drift);
+    const Vector3d sigma = options_.raw_bias_sigma * Vector3d(1, 1, kVerticalBias);
+    core_.gnss_class = {sigma, options_.single_point_correlation_time, sigma.cwiseAbs2()};
   }
   for (std::size_t system = 1; system < gnss::kSystems; ++system) {
     if (raw.system_known.at(system - 1)) continue;

@@ -59,9 +59,8 @@ Json json_of(const Experiment& experiment) {
   for (const NamedSequence& sequence : experiment.sequences) {
     sequences.push_back({{"name", sequence.name}, {"fingerprint", sequence.fingerprint}});
   }
-  return {{"pade", version},
-          {"options", io::json_of(experiment.options)},
-          {"sequences", std::move(sequences)}};
+  return {
+      {"pade", version}, {"options", io::json_of(experiment.options)}, {"sequences", std::move(sequences)}};
 }
 
 std::string to_json(const Experiment& experiment) { return json_of(experiment).dump(2) + "\n"; }
