@@ -290,7 +290,9 @@ Status inform_of_sequence(const InfoArguments& arguments) {
 }
 
 Status inform_of_map(const InfoArguments& arguments) {
-  const Result<mapping::OccupancyMap> map = io::read_map(arguments.path);
+  const auto made_with = io::options_beside(arguments.path);
+  if (!made_with) return made_with.error();
+  const Result<mapping::OccupancyMap> map = io::read_map(arguments.path, *made_with);
   if (!map) return map.error();
   const double voxel = map->options().voxel;
   const mapping::OccupancyMap::Counts counts = map->counts();
@@ -409,7 +411,11 @@ Status inform(const InfoArguments& arguments) {
     const bool map = path.extension() == ".bt" || path.extension() == ".ot";
     return map ? inform_of_map(arguments) : inform_of_calibration(path, arguments.camera, arguments.json);
   }
-  return fs::exists(path / "run.json", code) ? inform_of_run(arguments) : inform_of_sequence(arguments);
+  if (!fs::exists(path / "run.json", code)) return inform_of_sequence(arguments);
+  if (arguments.at.empty()) return inform_of_run(arguments);
+  InfoArguments of_map = arguments;
+  of_map.path = io::map_file_of(path).string();
+  return inform_of_map(of_map);
 }
 
 }  // namespace

@@ -62,10 +62,23 @@ void set(T& field, const std::optional<T>& given) {
 Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   MapSequenceOptions options;
   if (arguments.paper) options.mapper = as_printed(options.mapper);
+  const bool of_pair =
+      !arguments.depth || *arguments.depth == DepthFrom::pade || *arguments.depth == DepthFrom::ttc;
+  if (arguments.paper && !of_pair) {
+    return Error{
+        fmt::format("--depth: found {} beside --paper, which is of one pair of frames; expected pade or ttc",
+                    to_name(*arguments.depth))};
+  }
+  if (arguments.imu) set_imu(options, *arguments.imu);
   if (!arguments.config.empty()) {
     const auto text = io::read_file(arguments.config);
     if (!text) return text.error();
     if (Status status = read_options(*text, arguments.config, options); !status) return status.error();
+    if (arguments.imu && options.imu != *arguments.imu) {  // its single options stay, its class does not
+      set_imu(options, *arguments.imu);
+      if (Status status = io::from_yaml(*text, arguments.config, options); !status) return status.error();
+      options.imu = *arguments.imu;
+    }
   }
   ObstacleMapperOptions& mapper = options.mapper;
   set(mapper.flow, arguments.flow);
@@ -88,7 +101,6 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.origin, arguments.origin);
   set(options.sequence.camera, arguments.camera);
   set(options.sequence.topics, arguments.topics);
-  if (arguments.imu) set_imu(options, *arguments.imu);
   if (arguments.feed_camera) options.navigation.filter.camera = *arguments.feed_camera == "on";
   options.sequence.strict = options.sequence.strict || arguments.strict;
   options.world_coordinates = options.world_coordinates || arguments.world_coordinates;
@@ -159,8 +171,10 @@ void print_table(const MapArguments& arguments, const MapResult& result) {
         static_cast<double>(result.timing.peak_memory) / 1e6);
   }
   if (result.accuracy) fmt::print("\n{}", evaluation::to_table(*result.accuracy));
+  std::error_code code;
+  const bool report = std::filesystem::exists(std::filesystem::path(arguments.out) / "report.html", code);
   fmt::print("\nWritten to {}{}\n", arguments.out,
-             arguments.no_report ? "" : fmt::format("; look at {}/report.html", arguments.out));
+             report ? fmt::format("; look at {}/report.html", arguments.out) : "");
 }
 
 void run(const MapArguments& arguments, Context& context) {

@@ -44,20 +44,36 @@ struct PlanArguments {
   bool json = false;
 };
 
-/// The map file of a run's folder, or the file itself.
-fs::path map_file_of(const fs::path& path) {
-  std::error_code code;
-  if (!fs::is_directory(path, code)) return path;
-  return fs::exists(path / "map.ot", code) ? path / "map.ot" : path / "map.bt";
-}
+/// Where the vehicle has been, in pieces: nobody knows what lies in a gap between two poses.
+struct FlownTrack {
+  std::vector<std::vector<Vector3d>> pieces;
+  std::vector<std::string> notes;
+};
 
-Result<std::vector<Vector3d>> track_of(const std::string& file) {
-  std::vector<Vector3d> track;
+/// @param reach  two poses that are farther apart than twice this are not joined, m
+Result<FlownTrack> track_of(const std::string& file, double reach) {
+  FlownTrack track;
   if (file.empty()) return track;
   io::ReadReport report;
   const auto poses = io::read_trajectory(file, report);
   if (!poses) return poses.error();
-  for (const io::StampedPose& row : poses->rows()) track.push_back(row.pose.translation);
+  for (const io::StampedPose& row : poses->rows()) {
+    const Vector3d& place = row.pose.translation;
+    if (track.pieces.empty() || (track.pieces.back().back() - place).norm() > 2 * reach)
+      track.pieces.emplace_back();
+    track.pieces.back().push_back(place);
+  }
+  if (track.pieces.size() > 1) {
+    track.notes.push_back(
+        fmt::format("the track has {} gaps of more than {:.2f} m: what lies in them is not taken "
+                    "for flown through",
+                    track.pieces.size() - 1, 2 * reach));
+  }
+  if (!report.skipped.empty()) {
+    track.notes.push_back(fmt::format("{} rows of the track were left out, the first: {}: {}",
+                                      report.skipped.size(), report.skipped.front().file,
+                                      report.skipped.front().reason));
+  }
   return track;
 }
 
@@ -90,16 +106,26 @@ struct Planned {
 };
 
 Result<Planned> find_route(const PlanArguments& arguments) {
-  const fs::path file = map_file_of(arguments.map);
-  const auto map = io::read_map(file);
+  if (const Status sensible = planning::check(arguments.options); !sensible) return sensible.error();
+  const fs::path file = io::map_file_of(arguments.map);
+  const auto made_with = io::options_beside(file);
+  if (!made_with) return made_with.error();
+  const auto map = io::read_map(file, *made_with);
   if (!map) return map.error();
-  const auto track = track_of(arguments.track);
+  const double reach = arguments.options.radius + 2 * map->options().voxel;
+  const auto track = track_of(arguments.track, reach);
   if (!track) return track.error();
-  const auto view =
-      mapping::MapView::of(*map)->flown(*track, arguments.options.radius + 2 * map->options().voxel);
+  auto view = mapping::MapView::of(*map);
+  for (const std::vector<Vector3d>& piece : track->pieces) {
+    if (io::interrupted()) return io::interrupted_error();
+    view = view->flown(piece, reach);
+  }
   const auto point = [](const std::vector<double>& v) { return Vector3d(v[0], v[1], v[2]); };
-  auto route = planning::plan_route(*view, point(arguments.start), point(arguments.goal), arguments.options);
+  auto route = planning::plan_route(*view, point(arguments.start), point(arguments.goal), arguments.options,
+                                    [] { return io::interrupted(); });
+  if (!route && io::interrupted()) return io::interrupted_error();
   if (!route) return Error{fmt::format("{}: {}", file.string(), route.error().message)};
+  route->notes.insert(route->notes.end(), track->notes.begin(), track->notes.end());
   auto mission = mission_of(*route, file, arguments.options.motion.speed);
   if (!mission) return mission.error();
   std::string picture =

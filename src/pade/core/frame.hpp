@@ -18,4 +18,12 @@ struct Frame {
   Matrix6d motion_covariance = Matrix6d::Zero();
 };
 
+/// Covariance of a motion over frames that were left out too: what is wrong with one step, a velocity or a
+/// yaw, is wrong with the next.
+/// @param covariance  of one step. @param missed  frames that were left out
+inline Matrix6d over_missed(const Matrix6d& covariance, int missed) {
+  const double steps = missed + 1;
+  return steps * steps * covariance;
+}
+
 }  // namespace pade

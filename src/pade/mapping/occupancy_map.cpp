@@ -64,6 +64,22 @@ bool is_placed(const PendingHits::Evidence& evidence) {
   return 4 * std::numbers::pi * sum * sum / looks >= 1 / (kPlacedTo * kPlacedTo);
 }
 
+/// By position, each place once: a cube holds what lies in it.
+void put_in_order(std::vector<MapCell>& cells) {
+  std::sort(cells.begin(), cells.end(), [](const MapCell& a, const MapCell& b) {
+    const std::uint64_t code_a = morton_code(a.key);
+    const std::uint64_t code_b = morton_code(b.key);
+    return code_a != code_b ? code_a < code_b : a.depth < b.depth;
+  });
+  std::uint64_t end = 0;
+  std::erase_if(cells, [&end](const MapCell& cell) {
+    const std::uint64_t code = morton_code(cell.key);
+    if (code < end) return true;
+    end = code + voxels_of(cell.depth);
+    return false;
+  });
+}
+
 }  // namespace
 
 Status check(const MapOptions& o) {
@@ -240,6 +256,7 @@ MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera,
     scratch_->ages->see(scratch_->free);
   }
   voxels_->apply(scratch_->free, scratch_->hits, change);
+  if (!change.became_unknown.empty()) put_in_order(change.touched);
   remember_view();
   pack_far(T_world_camera.translation);
   return change;

@@ -15,6 +15,7 @@ enum class DepthFrom { multi_view, two_view, pade, ttc };
 inline void choose_depth(DepthFrom from, ObstacleMapperOptions& mapper) {
   switch (from) {
     case DepthFrom::multi_view:
+      if (mapper.views.count == 0) mapper.views.count = ObstacleMapperOptions().views.count;
       return;
     case DepthFrom::two_view:
       mapper.views.count = 0;

@@ -99,6 +99,7 @@ class Run {
   Status add(std::size_t i, Loaded loaded) {
     if (!loaded.frame) {
       undecodable_.push_back({sequence_.image_file(i).string(), loaded.frame.error().message});
+      ++missed_;
       return sequence_.check(undecodable_.size());
     }
     const Frame& frame = *loaded.frame;
@@ -106,13 +107,15 @@ class Run {
     while (truths_.size() > step() + 1) truths_.erase(truths_.begin());
 
     const double cpu_before = io::thread_cpu_seconds();
-    const MapperUpdate& update =
-        mapper_.add(frame.image, frame.time, frame.T_world_camera, frame.motion_covariance);
+    const MapperUpdate& update = mapper_.add(frame.image, frame.time, frame.T_world_camera,
+                                             over_missed(frame.motion_covariance, missed_));
     stages_cpu_ += io::thread_cpu_seconds() - cpu_before;
     if (update.outcome == MapperUpdate::Outcome::skipped) {
       undecodable_.push_back({sequence_.image_file(i).string(), update.reason});
+      ++missed_;
       return sequence_.check(undecodable_.size());
     }
+    missed_ = 0;
     ++used_;
     writer_.add_pose(frame.time, mapper_.T_world_camera());
     path_.push_back(mapper_.T_world_camera().translation);
@@ -267,6 +270,7 @@ class Run {
   std::array<std::vector<double>, stage_names.size()> milliseconds_;
   double stages_cpu_ = 0;  // s
   std::size_t used_ = 0;
+  int missed_ = 0;  // frames since the last one that was used
 };
 
 }  // namespace

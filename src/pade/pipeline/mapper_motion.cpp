@@ -12,6 +12,7 @@ namespace {
 constexpr double kScaleDrift = 1e-5;  // variance of the logarithm, from frame to frame
 constexpr double kLengthGate = 16;    // four sigmas
 constexpr double kUnsureTurn = 0.02;  // rad
+constexpr double kTie = 0.1;          // of a frame to the one just before it
 
 /// What an alignment says of the length of the step.
 std::optional<depth::BaselineWindow::Seen> length_seen(const depth::AlignedMotion& aligned, int steps) {
@@ -124,6 +125,12 @@ void ObstacleMapper::place(TrackedFrame& newest, const TrackedFrame& older) cons
   newest.frame.T_world_camera =
       older.frame.T_world_camera *
       (options_.order == Order::newest ? T_reference_other.inverse() : T_reference_other);
+  if (options_.step > 1) {
+    // Each of so many chains of frames would go its own way: the poses as given tie them to each other.
+    const TrackedFrame& last = recent_.last();
+    newest.frame.T_world_camera = interpolate(
+        newest.frame.T_world_camera, last.frame.T_world_camera * (last.given.inverse() * newest.given), kTie);
+  }
   newest.frame.T_world_camera.rotation.normalize();
 }
 

@@ -333,7 +333,8 @@ RelativeMotion ObstacleMapper::motion_to(const Frame& newest, const Pair& pair, 
 /// Several views at once, from where the pair has ended.
 void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   const Stopwatch watch(update_, Stage::depth);
-  const std::vector<int> chosen = recent_.views(newest, options_.views.count, options_.views.frames);
+  const std::vector<int> chosen =
+      recent_.views(newest, options_.views.count, options_.views.frames, options_.step);
   if (chosen.empty()) {
     found_ = {};
     return;

@@ -1,7 +1,6 @@
 #include "pade/pipeline/recent_frames.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 namespace pade {
@@ -11,12 +10,23 @@ void RecentFrames::push(TrackedFrame frame, int most) {
   while (size() > most) frames_.pop_front();
 }
 
-std::vector<int> RecentFrames::views(const Frame& newest, int count, int frames) const {
+std::vector<int> RecentFrames::views(const Frame& newest, int count, int frames, int step) const {
+  const auto length_to = [&](int i) {
+    return (before(i).frame.T_world_camera.translation - newest.T_world_camera.translation).norm();
+  };
+  const int oldest = std::min(frames, size()) / step * step;
+  int farthest = 0;  // a camera that turns back was farther away in between
+  double wanted = 0;
+  for (int i = step; i <= oldest; i += step) {
+    const double length = length_to(i);
+    if (length >= wanted && length > 0) {
+      farthest = i;
+      wanted = length;
+    }
+  }
   std::vector<int> views;
-  double wanted = std::numeric_limits<double>::infinity();
-  for (int i = std::min(frames, size()); i >= 1 && static_cast<int>(views.size()) < count; --i) {
-    const double length =
-        (before(i).frame.T_world_camera.translation - newest.T_world_camera.translation).norm();
+  for (int i = farthest; i >= 1 && static_cast<int>(views.size()) < count; i -= step) {
+    const double length = length_to(i);
     if (length > wanted || !(length > 0)) continue;
     views.push_back(i);
     wanted = length / 2 * (1 + 1e-6);

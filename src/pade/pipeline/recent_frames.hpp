@@ -35,8 +35,8 @@ class RecentFrames {
 
   /// Views whose baselines double, the longest one last: how many frames each is back.
   /// @param newest  what they are views of, not yet taken in. @param count  at most so many views. @param
-  /// frames  the oldest is at most so old
-  [[nodiscard]] std::vector<int> views(const Frame& newest, int count, int frames) const;
+  /// frames  the oldest is at most so old. @param step  only each so many
+  [[nodiscard]] std::vector<int> views(const Frame& newest, int count, int frames, int step = 1) const;
 
   /// Stretches the steps between the frames about the last one.
   /// @param factors  of the steps, oldest first. @param steps  the last so many are a baseline

@@ -221,10 +221,12 @@ double LocalPlanner::best_heading(const Task& task) const {
   return heading;
 }
 
-bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command) {
+bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command, double clear) {
   foretell(task.from, command, options_.horizon, options_.step, options_.vehicle, candidate_);
   if (!is_in_bounds(task, candidate_, true) || clear_length(task, candidate_, near_) != kInfinity)
     return false;
+  path_.assign(1, candidate_.back().position);
+  if (task.space.clear_length(path_, clear, options_.unknown_is_free) != kInfinity) return false;
   plan_.kind = PlanKind::recovering;
   plan_.command = command;
   plan_.motion.swap(candidate_);
@@ -239,11 +241,15 @@ bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command) {
 bool LocalPlanner::hop(const Task& task) {
   constexpr std::array<std::array<double, 3>, 5> kWays = {
       {{0, 1, 0}, {0, -1, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}}};
-  for (std::size_t i = 0; i < kWays.size(); ++i) {
-    const auto& way = kWays[(static_cast<std::size_t>(hops_) + i) % kWays.size()];
-    if (try_hop(task, {kHopSpeed * way[0], kHopSpeed * way[1], kHopSpeed * way[2], 0, 0})) {
-      hops_ += static_cast<int>(i) + 1;
-      return true;
+  // Away from what it nearly touches, but not against another thing; where that cannot be, a little away.
+  constexpr double kALittle = 0.05;  // m
+  for (const double clear : {plan_.radius, std::min(plan_.radius, near_ + kALittle)}) {
+    for (std::size_t i = 0; i < kWays.size(); ++i) {
+      const auto& way = kWays[(static_cast<std::size_t>(hops_) + i) % kWays.size()];
+      if (try_hop(task, {kHopSpeed * way[0], kHopSpeed * way[1], kHopSpeed * way[2], 0, 0}, clear)) {
+        hops_ += static_cast<int>(i) + 1;
+        return true;
+      }
     }
   }
   return false;

@@ -93,7 +93,7 @@ class LocalPlanner {
   void recover(const Task& task);
   bool turn(const Task& task);
   [[nodiscard]] double best_heading(const Task& task) const;
-  bool try_hop(const Task& task, const MotionCommand& command);
+  bool try_hop(const Task& task, const MotionCommand& command, double clear);
   bool hop(const Task& task);
   bool goes_on_hopping(const Task& task);
   [[nodiscard]] bool gets_nowhere(const Task& task);

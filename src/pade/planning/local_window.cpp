@@ -75,8 +75,19 @@ void LocalWindow::spread_rows(const Bits& from, int reach, bool beyond) {
       const std::uint64_t left = w > 0 ? from[start + w - 1] : outside;
       const std::uint64_t right = w + 1 < words ? from[start + w + 1] : outside;
       std::uint64_t bits = here;
-      for (int i = 1; i <= reach; ++i)
+      for (int i = 1; i <= std::min(reach, kWordBits - 1); ++i)
         bits |= (here << i) | (here >> i) | (left >> (kWordBits - i)) | (right << (kWordBits - i));
+      for (int i = kWordBits; i <= reach; ++i) {
+        const int away = i / kWordBits;
+        const int shift = i % kWordBits;
+        const auto word = [&](int offset) {
+          const int at = static_cast<int>(w) + offset;
+          return at >= 0 && at < words_ ? from[start + static_cast<std::size_t>(at)] : outside;
+        };
+        bits |= (word(-away) << shift) | (word(away) >> shift);
+        if (shift > 0)
+          bits |= (word(-away - 1) >> (kWordBits - shift)) | (word(away + 1) << (kWordBits - shift));
+      }
       rows_[start + w] = bits;
     }
   }

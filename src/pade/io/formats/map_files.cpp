@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <octomap/OcTree.h>
 
+#include "pade/core/option_check.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
 
@@ -306,6 +307,29 @@ Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path,
 
 std::filesystem::path side_car_of(const std::filesystem::path& map_file) {
   return std::filesystem::path(map_file).replace_extension(".json");
+}
+
+std::filesystem::path map_file_of(const std::filesystem::path& map_or_run) {
+  std::error_code code;
+  if (!std::filesystem::is_directory(map_or_run, code)) return map_or_run;
+  const std::filesystem::path full = map_or_run / "map.ot";
+  return std::filesystem::exists(full, code) ? full : map_or_run / "map.bt";
+}
+
+Result<mapping::MapOptions> options_beside(const std::filesystem::path& map_file) {
+  mapping::MapOptions options;
+  const std::filesystem::path side_car = side_car_of(map_file);
+  std::error_code code;
+  if (!std::filesystem::exists(side_car, code)) return options;
+  const auto text = read_file(side_car);
+  if (!text) return text.error();
+  const auto json = nlohmann::json::parse(*text, nullptr, false);
+  if (!json.is_object()) return Error{fmt::format("{}: not a JSON object", side_car.string())};
+  const auto found = json.find("options");
+  if (found == json.end()) return options;
+  if (Status read = from_yaml(found->dump(), side_car.string(), options); !read) return read.error();
+  if (Status sensible = within(side_car.string(), check(options)); !sensible) return sensible.error();
+  return options;
 }
 
 std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin,

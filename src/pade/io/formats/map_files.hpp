@@ -47,6 +47,11 @@ Result<mapping::OccupancyMap> read_map(const std::filesystem::path& path,
 /// The side-car of `map.bt` and `map.ot` is `map.json` beside them: options of the map and, where known,
 /// where on Earth the origin of its world lies.
 std::filesystem::path side_car_of(const std::filesystem::path& map_file);
+/// The map file in the folder of a run, or the file itself.
+std::filesystem::path map_file_of(const std::filesystem::path& map_or_run);
+/// The options that the side-car of a map holds, with which it was made: above which occupancy a voxel of an
+/// .ot counts as occupied. Defaults where there is none. Errors: it is no side-car.
+Result<mapping::MapOptions> options_beside(const std::filesystem::path& map_file);
 /// `local_origin` is RunInfo::local_origin: the point of the pose world that is 0 0 0 of the map.
 std::string encode_side_car(const mapping::MapOptions& options, const std::optional<GeographicOrigin>& origin,
                             const Eigen::Vector3d& local_origin = Eigen::Vector3d::Zero());

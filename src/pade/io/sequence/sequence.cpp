@@ -84,8 +84,10 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, Sequ
   const Calibration& calibration = listing.calibration;
   const Time offset = Time::from_seconds(listing.computed ? 0 : calibration.time_offset_s.value_or(0));
   std::vector<FrameEntry> frames;
+  int missed = 0;  // since the last frame: the next motion is over all of them
   for (const auto& [source, info] : images) {
     const std::string file = source.file.string();
+    missed += info.size != camera.size() || info.bits != bits ? 1 : 0;
     if (info.size != camera.size()) {
       report.skip(file, fmt::format("the image has {} pixels, expected {} as the calibration states",
                                     size_text(info.size), size_text(camera.size())));
@@ -104,8 +106,9 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, Sequ
     const Pose T_world_camera =
         listing.poses_of_body ? camera_pose(*pose, *calibration.T_body_camera) : *pose;
     FrameEntry frame{source.time, source.file, T_world_camera, Matrix6d::Zero(), {}};
+    const int left_out = std::exchange(missed, 0);
     if (const auto known = listing.covariances.find(source.time); known != listing.covariances.end()) {
-      frame.motion_covariance = known->second;
+      frame.motion_covariance = over_missed(known->second, left_out);
     }
     frames.push_back(std::move(frame));
   }

@@ -88,8 +88,8 @@ class Corridor : public ob::MotionValidator {
 class Search {
  public:
   Search(const MapView& view, const Vector3d& start, const Vector3d& goal, const RouteOptions& options,
-         double margin)
-      : options_(options), space_(std::make_shared<ob::RealVectorStateSpace>(3)) {
+         double margin, std::function<bool()> stop)
+      : options_(options), stop_(std::move(stop)), space_(std::make_shared<ob::RealVectorStateSpace>(3)) {
     Eigen::AlignedBox3d box = view.bounds();
     if (options.unknown == UnknownSpace::free) {
       box.extend(start).extend(goal);
@@ -142,7 +142,11 @@ class Search {
     planner->setProblemDefinition(problem_);
     planner->setup();
     ob::IterationTerminationCondition end(static_cast<unsigned>(iterations));
-    planner->solve(end);
+    if (stop_) {
+      planner->solve(ob::plannerOrTerminationCondition(end, ob::PlannerTerminationCondition(stop_)));
+    } else {
+      planner->solve(end);
+    }
     if (!problem_->hasExactSolution()) return {};
     auto* path = problem_->getSolutionPath()->as<og::PathGeometric>();
     og::PathSimplifier shorten(info_);
@@ -160,6 +164,7 @@ class Search {
   }
 
   RouteOptions options_;
+  std::function<bool()> stop_;
   std::shared_ptr<ob::RealVectorStateSpace> space_;
   ob::SpaceInformationPtr info_;
   ob::ProblemDefinitionPtr problem_;
@@ -168,13 +173,13 @@ class Search {
 }  // namespace
 
 FoundPath search_path(const MapView& view, const Vector3d& start, const Vector3d& goal,
-                      const RouteOptions& options, double margin) {
+                      const RouteOptions& options, double margin, const std::function<bool()>& stop) {
   const std::lock_guard lock(ompl_mutex());
   FoundPath found;
   Listener listener(found.complaints);
   ompl::RNG::setSeed(static_cast<std::uint_fast32_t>(options.seed));
   listener.listen();
-  found.corners = Search(view, start, goal, options, margin).run();
+  found.corners = Search(view, start, goal, options, margin, stop).run();
   return found;
 }
 

@@ -2,6 +2,7 @@
 // 2012): RRT-Connect for any path, Informed RRT* for a short one, both shortened.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,8 @@ struct FoundPath {
 };
 
 /// @param margin  added to the radius, m
+/// @param stop    asked now and then; true ends the search. May be empty
 FoundPath search_path(const mapping::MapView& view, const Eigen::Vector3d& start, const Eigen::Vector3d& goal,
-                      const RouteOptions& options, double margin);
+                      const RouteOptions& options, double margin, const std::function<bool()>& stop);
 
 }  // namespace pade::planning

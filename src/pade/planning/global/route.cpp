@@ -74,7 +74,7 @@ Result<std::vector<MotionPoint>> smoothed(const MapView& view, const std::vector
 
 Status check(const RouteOptions& o) {
   const Status status =
-      check_ranges(std::array{OptionRange{"radius", o.radius, 0.01, 100},
+      check_ranges(std::array{OptionRange{"radius", o.radius, 0.01, 10},
                               OptionRange{"iterations", static_cast<double>(o.iterations), 1, 1e9},
                               OptionRange{"improvements", static_cast<double>(o.improvements), 0, 1e9},
                               OptionRange{"seed", static_cast<double>(o.seed), 1, 2147483647}});
@@ -82,7 +82,7 @@ Status check(const RouteOptions& o) {
 }
 
 Result<Route> plan_route(const MapView& view, const Vector3d& start, const Vector3d& goal,
-                         const RouteOptions& options) {
+                         const RouteOptions& options, const std::function<bool()>& stop) {
   if (const Status status = check(options); !status) return status.error();
   if (const Status status = check_end(view, "start", start, options); !status) return status.error();
   if (const Status status = check_end(view, "goal", goal, options); !status) return status.error();
@@ -90,7 +90,7 @@ Result<Route> plan_route(const MapView& view, const Vector3d& start, const Vecto
   if (start == goal) {
     route.corners = {start};
   } else {
-    FoundPath found = search_path(view, start, goal, options, kMargin);
+    FoundPath found = search_path(view, start, goal, options, kMargin, stop);
     route.notes = std::move(found.complaints);
     route.corners = std::move(found.corners);
   }

@@ -3,6 +3,7 @@
 // bits.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -50,7 +51,9 @@ struct Route {
 /// if none is found.
 /// @param start  world, m
 /// @param goal   world, m
+/// @param stop   asked now and then; true ends the search as if there were no way
 Result<Route> plan_route(const mapping::MapView& view, const Eigen::Vector3d& start,
-                         const Eigen::Vector3d& goal, const RouteOptions& options);
+                         const Eigen::Vector3d& goal, const RouteOptions& options,
+                         const std::function<bool()>& stop = {});
 
 }  // namespace pade::planning
