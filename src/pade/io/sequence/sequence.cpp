@@ -483,7 +483,14 @@ const Calibration& Sequence::calibration() const { return data_->listing.calibra
 const Trajectory& Sequence::trajectory() const { return data_->listing.trajectory; }
 bool Sequence::poses_of_body() const { return data_->listing.poses_of_body; }
 bool Sequence::poses_computed() const { return data_->listing.computed; }
-bool Sequence::mask_is_stated() const { return path_exists(data_->folder / "mask.png"); }
+bool Sequence::mask_is_stated() const {
+  return !data_->listing.mask.empty() || path_exists(data_->folder / "mask.png");
+}
+const Matrix6d& Sequence::motion_covariance(std::size_t i) const {
+  return data_->frames[i].motion_covariance;
+}
+const std::optional<Pose>& Sequence::T_imu_camera() const { return data_->listing.T_imu_camera; }
+const std::vector<std::string>& Sequence::sources() const { return data_->listing.sources; }
 std::size_t Sequence::listed_frames() const { return data_->listing.images.size(); }
 std::size_t Sequence::frames_without_pose() const { return data_->listing.frames_without_pose; }
 std::size_t Sequence::motions_without_scale() const { return data_->listing.motions_without_scale; }
