@@ -177,26 +177,6 @@ std::vector<Pose> poses_of(const std::vector<FrameEntry>& frames) {
   return poses;
 }
 
-/// `# frame=ENU origin=lat,lon,h` in the head of gnss.csv.
-std::optional<GeographicOrigin> gnss_origin(const fs::path& folder) {
-  const auto text = read_file(folder / "gnss.csv");
-  if (!text) return std::nullopt;
-  const std::string_view head = std::string_view(*text).substr(0, text->find('\n'));
-  constexpr std::string_view kKey = "origin=";
-  const std::size_t at = head.find(kKey);
-  if (!head.starts_with('#') || at == std::string_view::npos) return std::nullopt;
-  const auto fields = split_fields(head.substr(at + kKey.size()));
-  if (fields.size() < 3) return std::nullopt;
-  const auto latitude = parse_number(fields[0]);
-  const auto longitude = parse_number(fields[1]);
-  const auto height = parse_number(fields[2]);
-  if (!latitude || !longitude || !height || !(std::abs(*latitude) <= 90) || !(std::abs(*longitude) <= 360) ||
-      !std::isfinite(*height)) {
-    return std::nullopt;
-  }
-  return GeographicOrigin{*latitude, *longitude, *height};
-}
-
 std::string first_reason(const ReadReport& report) {
   if (report.skipped.empty()) return {};
   const auto& [file, reason] = report.skipped[0];
