@@ -81,9 +81,10 @@ std::vector<GnssVelocity> complete(const std::vector<StatedVelocity>& stated, co
                     topic, open, stated.size()));
   }
   if (filled > 0) {
-    notes.push_back(fmt::format("{}: {} of {} velocities state no accuracy: {} m/s and {} m/s vertically",
-                                topic, filled, stated.size(), defaults.velocity_horizontal,
-                                defaults.velocity_vertical));
+    notes.push_back(
+        fmt::format("{}: {} of {} velocities state no accuracy: {} m/s{}", topic, filled, stated.size(),
+                    defaults.velocity_horizontal,
+                    level ? "" : fmt::format(" and {} m/s vertically", defaults.velocity_vertical)));
   }
   return out;
 }
