@@ -166,7 +166,7 @@ TEST(RecordedFixes, KeepTheWholeOfACovariance) {
 TEST(RecordedImu, InAnotherUnitOrWithoutMeasurementIsRefusedByName) {
   SensorMessages messages;
   messages.force = {0.05, 0, 1};
-  EXPECT_THAT(refusal_of(messages), HasSubstr("/imu: the specific force is 1 (median norm)"));
+  EXPECT_THAT(refusal_of(messages), HasSubstr("/imu: the specific force is 1.001 (median norm)"));
   EXPECT_THAT(refusal_of(messages), HasSubstr("this is in g"));
   messages.force = {0.5, 0, 9.8};
   messages.silent = -1;

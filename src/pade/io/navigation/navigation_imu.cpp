@@ -146,8 +146,7 @@ void remark_step_back(const NumericTable& table, const std::vector<std::optional
 
 }  // namespace
 
-Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view name,
-                       std::string_view remedy) {
+Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view name, bool has_heading) {
   if (samples.empty()) return {};
   std::vector<double> force;
   std::vector<double> rate;
@@ -156,10 +155,14 @@ Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view n
     rate.push_back(sample.angular_rate.norm());
   }
   const double median_force = median(force);
+  const auto remedy = [&](std::string_view heading) {
+    return has_heading ? fmt::format("convert it, or write the unit into the heading ({})", heading)
+                       : std::string("convert it");
+  };
   const auto is_in = [&](std::string_view unit) {
     return Error{fmt::format(
-        "{}: the specific force is {:.3g} (median norm), expected about {:.2f} m/s²: this is in {}; {}", name,
-        median_force, kStandardGravity, unit, remedy)};
+        "{}: the specific force is {:.4g} (median norm), expected about {:.2f} m/s²: this is in {}; {}", name,
+        median_force, kStandardGravity, unit, remedy(fmt::format("ax [{}]", unit)))};
   };
   if (median_force > 0.7 && median_force < 1.4) return is_in("g");
   if (median_force > 700 && median_force < 1400) return is_in("mg");
@@ -174,7 +177,7 @@ Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view n
     return Error{
         fmt::format("{}: the angular rate is {:.1f} (median norm), which no vehicle keeps up in "
                     "rad/s: this is in deg/s; {}",
-                    name, median_rate, remedy)};
+                    name, median_rate, remedy("gx [deg/s]"))};
   }
   return {};
 }
@@ -215,8 +218,7 @@ Result<std::vector<ImuSample>> parse_imu(std::string_view text, std::string_view
     remarks.push_back(
         fmt::format("{}: {} rows of other IMUs than number {:g} were left out", name, others, instance));
   }
-  const Status units =
-      check_imu_units(samples, name, "convert it, or write the unit into the heading (ax [g], gx [deg/s])");
+  const Status units = check_imu_units(samples, name, true);
   if (!units) return units.error();
   return samples;
 }

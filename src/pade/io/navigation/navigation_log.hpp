@@ -83,9 +83,9 @@ Result<RecordedSensors> read_some_sensors(const std::filesystem::path& file, std
 
 /// Whether the samples are in m/s² and rad/s: the norm of the specific force is near gravity most of the
 /// time, whatever the vehicle does. Nothing is said of none.
-/// @param name    of the file, for the message
-/// @param remedy  "convert it"
-Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view name, std::string_view remedy);
+/// @param name         of the file, for the message
+/// @param has_heading  which may state another unit
+Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view name, bool has_heading);
 
 /// Our own layout as text, stamps with nine digits where needed; what parse_imu and parse_gnss read back.
 std::string format_imu(const std::vector<ImuSample>& samples);

@@ -183,7 +183,7 @@ class SensorReader {
     }
     if (log_.imu.empty()) return none_of("IMU", "usable sensor_msgs/Imu");
     return check_imu_units(log_.imu, fmt::format("{}: {}", recording_.file().string(), (*topic)->name),
-                           "convert it");
+                           false);
   }
 
   Status read_fixes() {
