@@ -403,6 +403,11 @@ Status inform(const InfoArguments& arguments) {
     if (!images) return images.error();
     return *images ? inform_of_sequence(arguments) : Status();
   }
+  const bool sequence = fs::is_directory(path, code) && !fs::exists(path / "run.json", code);
+  if (!arguments.topics.empty() && !sequence) {
+    return Error{
+        fmt::format("{}: is no recording of ROS, expected one since topics are named", arguments.path)};
+  }
   if (!fs::is_directory(path, code)) {
     if (live::is_tlog(path)) return inform_of_tlog(path, arguments.json);
     if (live::is_ulog(path)) return inform_of_ulog(path, arguments.json);

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <random>
 #include <string>
+#include <string_view>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -186,6 +187,17 @@ TEST_F(BadInput, EvaluateAndInfoOfWhatIsNoRun) {
   EXPECT_EQ(shell(kPade + " info " + (out() / "map.bt").string()).code, 0);
   std::ofstream(out() / "run.json") << "{ not json";
   EXPECT_EQ(shell(kPade + " evaluate " + out().string()).code, 1);
+}
+
+TEST_F(BadInput, TopicsOfWhatHasNone) {
+  expect_refused(map("--topics /image"), "is no recording of ROS");
+  for (const char* const of : {"flight", "log.ulg"}) {
+    std::ofstream(base_ / "log.ulg") << "ULog";
+    const fs::path path = std::string_view(of) == "flight" ? flight() : base_ / of;
+    for (const std::string& command :
+         {" info " + path.string(), " navigate " + path.string() + " -o " + out().string()})
+      expect_refused(shell(kPade + command + " --topics /image"), "expected");
+  }
 }
 
 TEST_F(BadInput, AConfigurationWhoseNumbersMakeNoSense) {

@@ -116,7 +116,9 @@ TEST_P(Packing, ChangesNothingThatIsSeenOrWritten) {
       const std::uint64_t cube = code & ~(voxels_of(10) - 1);
       ASSERT_EQ(plain.count_least(cube, 10), packing.count_least(cube, 10));
     }
-    if (round % 6 == 5) ASSERT_EQ(leaves(plain), leaves(packing));
+    if (round % 6 == 5) {
+      ASSERT_EQ(leaves(plain), leaves(packing));
+    }
   }
   packing.pack_beyond({0, 0, 0}, 1);
   EXPECT_EQ(leaves(plain), leaves(packing));

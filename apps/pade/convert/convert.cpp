@@ -1,9 +1,11 @@
 // `pade convert`: a flight from a folder or a recording into a rosbag, an MCAP file or a folder.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -30,19 +32,47 @@ struct ConvertArguments {
 };
 
 /// The sensors that lie beside the images; empty if there are none. What is there and cannot be read is said.
-std::optional<NavigationLog> sensors_of(const ConvertArguments& arguments, const io::Sequence& sequence) {
+std::optional<io::RecordedSensors> sensors_of(const ConvertArguments& arguments,
+                                              const io::Sequence& sequence) {
   const fs::path in = arguments.in;
   const bool recording = io::is_recording(in);
-  if (!recording && !io::path_exists(in / "imu.csv") && !io::path_exists(in / "mav0" / "imu0"))
+  if (!recording && !io::path_exists(in / "imu.csv") && !io::path_exists(in / "mav0" / "imu0")) {
+    for (const char* const file : {"gnss.csv", "baro.csv", "mag.csv"})
+      if (io::path_exists(in / file)) fmt::print("left out: {}, since there is no imu.csv beside it\n", file);
     return std::nullopt;
-  io::NavigationLogOptions options;
-  options.topics = arguments.topics;
-  auto log = io::read_navigation_log(in, options);
-  if (log) return std::move(*log);
-  const bool none = recording && log.error().message.find("is missing") != std::string::npos;
-  if (!none)
-    fmt::print(stderr, "without the sensors of {}: {}\n", sequence.folder().string(), log.error().message);
+  }
+  Result<io::RecordedSensors> sensors = io::RecordedSensors{};
+  if (recording) {
+    sensors = io::read_some_sensors(in, arguments.topics);
+  } else if (auto log = io::read_navigation_log(in)) {
+    sensors->log = std::move(*log);
+  } else {
+    sensors = log.error();
+  }
+  if (sensors) return std::move(*sensors);
+  fmt::print(stderr, "without the sensors of {}: {}\n", sequence.folder().string(), sensors.error().message);
   return std::nullopt;
+}
+
+/// Topics of a recording that nobody read.
+std::string topics_left_out(const ConvertArguments& arguments, const io::Sequence& sequence,
+                            const std::vector<std::string>& of_sensors) {
+  if (!io::is_recording(arguments.in)) return {};
+  const auto recording = io::Recording::open(arguments.in);
+  if (!recording) return {};
+  const auto is_among = [](const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  std::string text;
+  for (const io::Topic& topic : recording->topics()) {
+    const bool transforms = topic.type == "tf2_msgs/TFMessage" || topic.type == "tf/tfMessage";
+    if (transforms || topic.messages.empty() || is_among(sequence.sources(), topic.name) ||
+        is_among(of_sensors, topic.name))
+      continue;
+    text +=
+        fmt::format("{}{} ({}, {})", text.empty() ? "" : ", ", topic.name, topic.type, topic.messages.size());
+  }
+  return text;
 }
 
 Result<io::WrittenFlight> write(const ConvertArguments& arguments, const io::Sequence& sequence,
@@ -75,11 +105,18 @@ Status convert(const ConvertArguments& arguments) {
   options.sequence.origin = "none";
   const auto sequence = open_sequence(arguments.in, options);
   if (!sequence) return sequence.error();
-  const auto log = sensors_of(arguments, *sequence);
-  const auto written = write(arguments, *sequence, log ? &*log : nullptr);
+  const auto sensors = sensors_of(arguments, *sequence);
+  const auto written = write(arguments, *sequence, sensors ? &sensors->log : nullptr);
   if (!written) return written.error();
   for (const std::string& note : sequence->notes()) fmt::print("note: {}\n", note);
+  if (sensors) {
+    for (const std::string& remark : sensors->log.remarks) fmt::print("note: {}\n", remark);
+  }
+  for (const std::string& note : written->notes) fmt::print("note: {}\n", note);
   for (const std::string& what : written->left_out) fmt::print("left out: {}\n", what);
+  const std::string topics =
+      topics_left_out(arguments, *sequence, sensors ? sensors->topics : std::vector<std::string>{});
+  if (!topics.empty()) fmt::print("left out: topics {}\n", topics);
   fmt::print("{} images, {} poses, {} IMU samples, {} GNSS positions in {}\n", written->images,
              written->poses, written->imu, written->fixes, arguments.out);
   return {};
@@ -93,9 +130,9 @@ void add_convert(CLI::App& app, Context& context) {
   command->footer(
       "Reads what `pade map` reads. Writes by the ending of OUT: .bag (rosbag 2.0), .mcap (MCAP with ROS 2 "
       "messages), "
-      "none (a\nfolder in the TUM layout). Usable frames, calibration, mounting, poses, IMU, GNSS, "
+      "none (a\nfolder in the TUM layout). Usable frames, calibration, mounting, mask, poses, IMU, GNSS, "
       "magnetometer and "
-      "barometer are\ncarried over; what else a recording holds is not (docs/formats.md).\n"
+      "barometer are\ncarried over; what else there is, is left out and said (docs/formats.md).\n"
       "  pade convert flight flight.bag\n"
       "  pade convert flight.db3 flight");
   command->add_option("IN", arguments->in, "Folder or recording of a flight")->required();

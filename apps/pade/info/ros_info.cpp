@@ -70,6 +70,12 @@ Json topics_json(const io::Recording& recording) {
   return topics;
 }
 
+/// What reading the sensors had to say beyond what opening had.
+std::vector<std::string> notes_of(const io::Recording& recording, const NavigationLog& sensors) {
+  const auto first = sensors.remarks.begin() + static_cast<std::ptrdiff_t>(recording.remarks().size());
+  return {first, sensors.remarks.end()};
+}
+
 }  // namespace
 
 Result<bool> inform_of_ros_recording(const std::filesystem::path& file, const std::string& topics,
@@ -84,6 +90,7 @@ Result<bool> inform_of_ros_recording(const std::filesystem::path& file, const st
     print_topics(*recording);
     if (sensors && !*sensors) line("sensors", "{}", sensors->error().message);
     if (sensors && *sensors) {
+      for (const std::string& remark : notes_of(*recording, **sensors)) line("note", "{}", remark);
       line("sensors", "IMU {}, GNSS {}, magnetometer {}, barometer {} samples", (*sensors)->imu.size(),
            (*sensors)->gnss.fixes.size(), (*sensors)->magnetometer.size(), (*sensors)->barometer.size());
     }
@@ -104,6 +111,7 @@ Result<bool> inform_of_ros_recording(const std::filesystem::path& file, const st
     json["last"] = to_string(span->second);
   }
   if (sensors && *sensors) {
+    for (const std::string& remark : notes_of(*recording, **sensors)) json["notes"].push_back(remark);
     json["sensors"] = {{"imu", (*sensors)->imu.size()},
                        {"gnss", (*sensors)->gnss.fixes.size()},
                        {"magnetometer", (*sensors)->magnetometer.size()},

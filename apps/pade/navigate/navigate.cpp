@@ -219,6 +219,9 @@ Result<CheckedLog> read_log(const NavigateArguments& arguments) {
   if (px4 || live::is_tlog(arguments.log)) {
     if (!arguments.gnss.empty())
       return Error{"--gnss: found a recording, which has one GNSS; expected a folder"};
+    if (!arguments.topics.empty())
+      return Error{
+          "--topics: found an autopilot's log, which has none to choose from; expected a recording of ROS"};
     auto sensors = px4 ? live::read_ulog_sensors(arguments.log) : live::read_tlog_sensors(arguments.log);
     if (!sensors) return sensors.error();
     return checked_log(std::move(*sensors));

@@ -126,7 +126,8 @@ class ChainLoop {
   Vector3d ground_ = Vector3d::Zero(), map_start_ = Vector3d::Zero(),
            goal_ = Vector3d::Zero();           // goal: as navigation has the world
   std::optional<std::pair<Time, Pose>> last_;  // frame, as navigation has it
-  Matrix6d since_taken_ = Matrix6d::Zero();    // of the motion to it from the last one that the mapper took
+  Time taken_;                                 // of the last one that the mapper took
+  Matrix6d since_taken_ = Matrix6d::Zero();    // of the motion from that one
   std::string skipped_;                        // why the last one was
   double stamp_correction_ = 0;                // s, of what the camera says
   Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
@@ -203,6 +204,11 @@ bool ChainLoop::place(Time stamp, Pose& pose, Matrix6d& covariance) {
   pose =
       last_->second * Pose{Eigen::Quaterniond(step.motion.R_reference_other), step.motion.t_reference_other};
   covariance = since_taken_ + step.motion.covariance;
+  if (since_taken_.isZero(0)) return true;
+  // What is wrong with one step, a velocity or a yaw, is wrong with the next: as long as navigation
+  // remembers.
+  const auto whole = vehicle_.navigator().relative_pose(taken_, stamp, T_body_camera_);
+  if (whole.answer == navigation::Answer::valid) covariance = whole.motion.covariance;
   return true;
 }
 
@@ -256,6 +262,7 @@ void ChainLoop::look(const cv::Mat& image, Time stamp) {
   }
   placed_ = mapper_.T_world_camera().translation;
   since_taken_.setZero();
+  taken_ = stamp;
   skipped_.clear();
   last_ = {stamp, pose};
   update_ = &update;
@@ -274,7 +281,7 @@ void ChainLoop::correct_stamps() {
   const std::optional<StampOffset>& offset = mapper_.health().stamp_offset;
   if (!offset || !offset->is_certain()) return;
   stamp_correction_ += offset->seconds;
-  last_->first.nanoseconds += std::llround(offset->seconds * 1e9);
+  for (Time* const time : {&last_->first, &taken_}) time->nanoseconds += std::llround(offset->seconds * 1e9);
   say(fmt::format(
       "the images show that their stamps are {:.1f} ms {} ({:.1f} ms, 1 sigma): corrected by {:.1f} ms",
       1e3 * std::abs(offset->seconds), offset->seconds < 0 ? "late" : "early", 1e3 * offset->sigma,

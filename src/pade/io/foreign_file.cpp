@@ -28,7 +28,8 @@ std::string advice_for(const std::filesystem::path& file) {
       "rosbag2's SQLite";
   constexpr std::string_view kFilm =
       "a film: write its frames into rgb/ as PNG, named by their times in seconds";
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kKinds = {
+  constexpr std::string_view kPacked = "a file that is compressed as a whole: decompress it (zstd -d)";
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kKinds = {
       {{".ulg", kUlog},
        {".bin", kArduPilot},
        {".log", kArduPilot},
@@ -40,7 +41,9 @@ std::string advice_for(const std::filesystem::path& file) {
        {".mov", kFilm},
        {".avi", kFilm},
        {".mkv", kFilm},
-       {".webm", kFilm}}};
+       {".webm", kFilm},
+       {".zstd", kPacked},
+       {".zst", kPacked}}};
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

@@ -146,5 +146,54 @@ TEST(LogFolder, NamesTheFilesThatWaitForTheirNames) {
   EXPECT_THAT(file.error().message, AllOf(HasSubstr("is a file"), HasSubstr("ulog2csv")));
 }
 
+TEST(EchoedLogs, HaveTheTimesOfTheirHeaders) {
+  const std::string imu_columns =
+      ",angular_velocity.x,angular_velocity.y,angular_velocity.z,linear_acceleration.x,linear_acceleration.y,"
+      "linear_acceleration.z\n";
+  const std::string values = ",0.1,0.2,0.3,1,2,9.7\n";
+  std::string whole = "%time,field.header.seq,field.header.stamp" + imu_columns;
+  std::string parted = "__time,/imu/header/stamp/sec,/imu/header/stamp/nanosec" + imu_columns;
+  std::string zeros = whole;
+  for (std::int64_t i = 0; i < 5; ++i) {
+    const std::int64_t measured = 1'500'000'000'023'456'789 + 10'000'000 * i;
+    const std::int64_t recorded = measured + 50'000'000;
+    whole += fmt::format("{},{},{}", recorded, i, measured) + values;
+    zeros += fmt::format("{},{},0", recorded, i) + values;
+    parted += fmt::format("{},{},{}", to_string(Time{recorded}), measured / 1'000'000'000,
+                          measured % 1'000'000'000) +
+              values;
+  }
+  for (const std::string& text : {whole, parted}) {
+    std::vector<std::string> remarks;
+    const auto read = parse_imu(text, "imu.csv", remarks);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->at(1).time.nanoseconds, 1'500'000'000'033'456'789);
+    EXPECT_THAT(remarks, Contains(HasSubstr("the times are those of the headers")));
+  }
+  std::vector<std::string> remarks;
+  EXPECT_EQ(parse_imu(zeros, "imu.csv", remarks)->at(1).time.nanoseconds, 1'500'000'000'083'456'789);
+}
+
+TEST(GnssLogs, TheStepsOverruleTheUnitThatSuchLogsHave) {
+  std::string text = "timestamp,fix_type,lat,lon,alt\n";
+  for (int i = 0; i < 20; ++i) text += fmt::format("{:.3f},3,470000000,80000000,500000\n", 1.6e9 + 0.2 * i);
+  std::vector<std::string> remarks;
+  const auto read = parse_gnss(text, "gnss.csv", {}, remarks);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->fixes[5].time, (Time{1'600'000'001'000'000'000}));
+  EXPECT_THAT(remarks, Contains(HasSubstr("timestamp is taken as seconds, from its steps, and not as the "
+                                          "microseconds that such logs have")));
+}
+
+TEST(GnssLogs, AVerticalVelocityThatIsAlwaysZeroIsLeftOpen) {
+  std::string text = "# frame=ENU origin=47,8,400\nt_s,pE,pN,pU,vE,vN,vU\n";
+  for (int i = 0; i < 20; ++i) text += fmt::format("{:.1f},0,0,{},1,0,0\n", 0.2 * i, 0.4 * i);
+  std::vector<std::string> remarks;
+  const auto read = parse_gnss(text, "gnss.csv", {}, remarks);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(measured_axes(read->velocities[3]), Vector3d(1, 1, 0));
+  EXPECT_THAT(remarks, Contains(HasSubstr("has no vertical velocity")));
+}
+
 }  // namespace
 }  // namespace pade::io

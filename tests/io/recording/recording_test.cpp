@@ -14,11 +14,10 @@
 #endif
 
 #include "pade/io/navigation/navigation_log.hpp"
-#include "pade/io/recording/flight/flight_writer.hpp"
 #include "pade/io/recording/flight/recorded_images.hpp"
 #include "pade/io/recording/messages/message_writer.hpp"
 
-#include "io/sequence/flight_folders.hpp"
+#include "io/recording/own_recording.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace pade::io {
@@ -26,44 +25,10 @@ namespace {
 
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
-
-/// Sensors of four seconds.
-NavigationLog some_sensors(Time start) {
-  NavigationLog log;
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
-  const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
-  log.gnss.origin = GeodeticOrigin{47.5, 8.25, 430};
-  log.gnss.lever_arm = Eigen::Vector3d(0.1, -0.2, 0.3);
-  for (int i = 0; i < 400; ++i) {
-    const Time time{start.nanoseconds + 10'000'000LL * i};
-    log.imu.push_back({time, vector(), vector()});
-    if (i % 50 != 0) continue;
-    const Eigen::Matrix3d covariance = Eigen::Vector3d(4, 4, 9).asDiagonal();
-    log.gnss.fixes.push_back({time, i == 0 ? Eigen::Vector3d::Zero().eval() : 20 * vector(), covariance});
-    log.gnss.velocities.push_back({time, vector(), 0.01 * covariance});
-    log.magnetometer.push_back({time, vector(), 0.05});
-    log.barometer.push_back({time, 430 + normal(random), 0.3});
-  }
-  return log;
-}
-
-/// A folder of a flight, opened.
-Sequence opened_flight(const fs::path& folder, const test::Flight& flight, const std::string& more = {}) {
-  test::write_tum(folder, flight);
-  test::write_text(folder / "camera.yaml", test::camera_yaml(flight.camera) + more);
-  auto sequence = Sequence::open(folder);
-  EXPECT_TRUE(sequence) << sequence.error().message;
-  return std::move(*sequence);
-}
-
-void record(const Sequence& sequence, const fs::path& file, const NavigationLog* log = nullptr) {
-  auto writer = create_recording(file, Overwrite::replace);
-  ASSERT_TRUE(writer) << writer.error().message;
-  const auto written = write_flight(sequence, log, **writer);
-  ASSERT_TRUE(written) << written.error().message;
-  EXPECT_EQ(written->images, sequence.size());
-}
+using test::opened_flight;
+using test::OwnRecording;
+using test::record;
+using test::some_sensors;
 
 void expect_same_flight(const Sequence& a, const Sequence& b) {
   ASSERT_EQ(a.size(), b.size());
@@ -159,24 +124,6 @@ TEST(RecordedFlight, WithoutSensorsSaysWhichIsMissing) {
   ASSERT_FALSE(log);
   EXPECT_THAT(log.error().message, HasSubstr("the IMU is missing"));
 }
-
-/// Writes messages of one's own.
-struct OwnRecording {
-  explicit OwnRecording(const fs::path& file) : writer(create_recording(file, Overwrite::replace).value()) {}
-  void camera(const std::string& image_topic, const test::Flight& flight, const std::string& frame) {
-    for (std::size_t i = 0; i < flight.size(); ++i) {
-      const MessageHeader header{flight.times[i], frame};
-      write("/camera_info", "sensor_msgs/CameraInfo", flight.times[i],
-            write_camera_info(header, flight.camera, writer->encoding()));
-      write(image_topic, "sensor_msgs/Image", flight.times[i],
-            write_image(header, flight.images[i], writer->encoding()));
-    }
-  }
-  void write(const std::string& topic, const std::string& type, Time time, const std::string& message) {
-    EXPECT_TRUE(writer->write(topic, type, time, message));
-  }
-  std::unique_ptr<RecordingWriter> writer;
-};
 
 TEST(RecordedFlight, AsksWhichTopicIsMeant) {
   const test::TemporaryFolder folder;

@@ -274,6 +274,11 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"IniWithoutAMatrix",
                 "[image]\n\nwidth\n640\n\nheight\n480\n\n[camera]\n\ndistortion\n0 0 0 0 0\n",
                 "section [camera] expected width and height"},
+        Refused{
+            "RosIniWithoutAModel",
+            "[image]\n\nwidth\n640\n\nheight\n480\n\n[camera]\n\ncamera matrix\n400 0 320\n0 400 240\n0 0 "
+            "1\n\ndistortion\n-0.01 0.02 0.003 -0.001\n",
+            "fisheye or plumb_bob"},
         Refused{"ThinPrism",
                 "image_width: 640\nimage_height: 480\ncamera_matrix:\n  data: [1, 0, 1, 0, 1, 1, 0, 0, "
                 "1]\ndistortion_model: rational_polynomial\ndistortion_coefficients:\n  data: [1, 1, 1, 1, "

@@ -1,5 +1,7 @@
 #include "pade/io/sequence/dialects/pose_dialects.hpp"
 
+#include <functional>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -258,6 +260,41 @@ TEST(ImageFolders, MayHaveOtherNames) {
   const auto sequence = Sequence::open(folder.path());
   ASSERT_TRUE(sequence) << sequence.error().message;
   EXPECT_EQ(sequence->size(), flight.size());
+}
+
+/// Rows of an odometry that was recorded 80 ms after it was measured, with the columns of its stamp.
+std::string echoed(const std::string& stamp_columns, const std::function<std::string(std::int64_t)>& stamp) {
+  std::string text = "%time,field.header.seq," + stamp_columns +
+                     ",field.pose.pose.position.x,field.pose.pose.position.y,field.pose.pose.position.z,"
+                     "field.pose.pose.orientation.x,field.pose.pose.orientation.y,"
+                     "field.pose.pose.orientation.z,field.pose.pose.orientation.w\n";
+  for (std::int64_t i = 0; i < 5; ++i) {
+    const std::int64_t measured = 1'500'000'000'123'456'789 + 100'000'000 * i;
+    text += fmt::format("{},{},{},1,2,{},0,0,0,1\n", measured + 80'000'000, i, stamp(measured), i);
+  }
+  return text;
+}
+
+TEST(EchoedPoses, HaveTheTimesOfTheirHeaders) {
+  const auto whole = [](std::int64_t t) { return fmt::format("{}", t); };
+  const auto parted = [](std::int64_t t) {
+    return fmt::format("{},{}", t / 1'000'000'000, t % 1'000'000'000);
+  };
+  for (const std::string& text :
+       {echoed("field.header.stamp", whole), echoed("header.stamp.secs,header.stamp.nsecs", parted)}) {
+    ReadReport report;
+    const auto poses = parse_any_poses(text, "odom.csv", {}, report);
+    ASSERT_TRUE(poses) << poses.error().message;
+    ASSERT_EQ(poses->rows().size(), 5U);
+    EXPECT_EQ(poses->rows()[1].time.nanoseconds, 1'500'000'000'223'456'789);
+    EXPECT_THAT(report.notes, testing::Contains(HasSubstr("the times are those of the headers")));
+  }
+  ReadReport report;
+  const auto zeros = [](std::int64_t) { return std::string("0"); };
+  const auto poses = parse_any_poses(echoed("field.header.stamp", zeros), "odom.csv", {}, report);
+  ASSERT_TRUE(poses) << poses.error().message;
+  EXPECT_EQ(poses->rows()[1].time.nanoseconds, 1'500'000'000'303'456'789);
+  EXPECT_THAT(report.notes, testing::Contains(HasSubstr("the headers have no stamps")));
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include "pade/io/navigation/geodetic_fixes.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <GeographicLib/LocalCartesian.hpp>
 #include <fmt/format.h>
 
@@ -9,8 +11,6 @@
 
 namespace pade::io {
 namespace {
-
-constexpr double kVerticalVelocity = 10;  // sigma of one that is not measured, m/s
 
 /// Counts how often a sigma had to be made up.
 struct Filler {
@@ -21,6 +21,28 @@ struct Filler {
     return otherwise;
   }
 };
+
+/// A covariance as it is stated where it is one; else its axes one by one.
+Eigen::Matrix3d usable_covariance(const Eigen::Matrix3d& stated, Filler& positions, Filler& heights) {
+  const GnssDefaults defaults;
+  if (stated.allFinite() && stated.diagonal().minCoeff() > 0) {
+    const Eigen::Matrix3d symmetric = 0.5 * (stated + stated.transpose());
+    if (symmetric.llt().info() == Eigen::Success) return symmetric;
+  }
+  const double east = positions(std::sqrt(stated(0, 0)), defaults.position_horizontal);
+  const double north = positions(std::sqrt(stated(1, 1)), defaults.position_horizontal);
+  const double up = heights(std::sqrt(stated(2, 2)), defaults.position_vertical);
+  return Eigen::Vector3d(east, north, up).cwiseAbs2().asDiagonal();
+}
+
+/// Whether all of many velocities have a vertical part of exactly 0, which no receiver measures.
+bool are_level(std::span<const GeodeticFix> fixes) {
+  constexpr std::ptrdiff_t kMany = 10;
+  const auto moving = [](const GeodeticFix& fix) { return fix.velocity.has_value(); };
+  return std::count_if(fixes.begin(), fixes.end(), moving) >= kMany &&
+         std::all_of(fixes.begin(), fixes.end(),
+                     [](const GeodeticFix& fix) { return !fix.velocity || fix.velocity->z() == 0; });
+}
 
 }  // namespace
 
@@ -38,25 +60,36 @@ GnssLog local_log(std::span<const GeodeticFix> fixes, const std::string& source,
   log.origin = GeodeticOrigin{first.latitude, first.longitude, first.height};
   const GeographicLib::LocalCartesian frame(first.latitude, first.longitude, first.height);
   Filler positions, heights, velocities, climbs;
+  std::size_t without = 0;
+  const bool all_level = are_level(fixes);
   bool level = false;
   for (const GeodeticFix& fix : fixes) {
     Eigen::Vector3d place;
     frame.Forward(fix.latitude, fix.longitude, fix.height, place.x(), place.y(), place.z());
-    const double across = positions(fix.horizontal, defaults.position_horizontal);
-    const double up = heights(fix.vertical, defaults.position_vertical);
-    log.fixes.push_back(
-        {fix.time, place, Eigen::Vector3d(across * across, across * across, up * up).asDiagonal()});
+    const std::size_t unknown = positions.filled + heights.filled;
+    Eigen::Matrix3d covariance;
+    if (fix.covariance) {
+      covariance = usable_covariance(*fix.covariance, positions, heights);
+    } else {
+      const double across = positions(fix.horizontal, defaults.position_horizontal);
+      const double up = heights(fix.vertical, defaults.position_vertical);
+      covariance = Eigen::Vector3d(across, across, up).cwiseAbs2().asDiagonal();
+    }
+    if (positions.filled + heights.filled > unknown) ++without;
+    log.fixes.push_back({fix.time, place, covariance});
     if (!fix.velocity) continue;
     const double speed = velocities(fix.velocity_sigma, defaults.velocity_horizontal);
     double climb = climbs(fix.velocity_sigma, defaults.velocity_vertical);
-    if (!fix.climbs) climb = kVerticalVelocity;
-    level = level || !fix.climbs;
+    const bool open = !fix.climbs || all_level;
+    if (open) climb = open_vertical_velocity;
+    level = level || open;
     log.velocities.push_back(
         {fix.time, *fix.velocity, Eigen::Vector3d(speed * speed, speed * speed, climb * climb).asDiagonal()});
   }
-  if (positions.filled > 0) {
-    remarks.push_back(fmt::format("{}: {} of {} positions state no accuracy: {} m and {} m vertically",
-                                  source, positions.filled, log.fixes.size(), defaults.position_horizontal,
+  if (without > 0) {
+    remarks.push_back(fmt::format("{}: {} of {} positions state no accuracy{}: {} m and {} m vertically",
+                                  source, without, log.fixes.size(),
+                                  positions.filled == 0 ? " of the height" : "", defaults.position_horizontal,
                                   defaults.position_vertical));
   }
   if (velocities.filled > 0) {

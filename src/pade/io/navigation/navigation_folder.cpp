@@ -63,7 +63,16 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
   namespace fs = std::filesystem;
   NavigationLog log;
   std::error_code failure;
-  if (is_recording(folder)) return read_recording_sensors(folder, options.topics);
+  if (is_recording(folder)) {
+    if (!options.gnss.empty())
+      return Error{fmt::format("{}: found a recording, whose GNSS are topics, expected no GNSS file ({})",
+                               folder.string(), in_quotes(options.gnss))};
+    return read_recording_sensors(folder, options.topics);
+  }
+  if (!options.topics.empty()) {
+    return Error{fmt::format("{}: is no recording of ROS, expected one since topics are named ({})",
+                             folder.string(), in_quotes(options.topics))};
+  }
   if (fs::is_regular_file(folder, failure)) {
     return Error{fmt::format("{}: is a file, expected a folder with imu.csv and gnss.csv{}", folder.string(),
                              advice_for(folder))};
@@ -77,6 +86,8 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
     }
   }
   if (!path_exists(imu)) imu = file_ending_with(folder, "-imu.csv");
+  if (const auto why = imu.empty() ? why_no_recording(folder) : std::nullopt)
+    return Error{folder.string() + ": " + *why};
   if (imu.empty())
     return Error{
         fmt::format("{}: no IMU log found, expected imu.csv or mav0/imu0/data.csv (raw GNSS alone: --raw; "
@@ -152,19 +163,26 @@ std::string format_gnss(const GnssLog& log) {
                    log.lever_arm->z());
   }
   text += "\nt_s,pE,pN,pU,vE,vN,vU,sE,sN,sU,svE,svN,svU\n";
-  std::size_t next = 0;
-  for (const GnssFix& fix : log.fixes) {
-    while (next < log.velocities.size() && log.velocities[next].time < fix.time) ++next;
-    const bool paired = next < log.velocities.size() && log.velocities[next].time == fix.time;
+  const auto add = [&](Time time, const GnssFix* fix, const GnssVelocity* velocity) {
     const Eigen::Vector3d none = Eigen::Vector3d::Constant(std::nan(""));
-    const Eigen::Vector3d v = paired ? log.velocities[next].velocity : none;
-    const Eigen::Vector3d s = fix.covariance.diagonal().cwiseSqrt();
-    const Eigen::Vector3d sv =
-        paired ? Eigen::Vector3d(log.velocities[next].covariance.diagonal().cwiseSqrt()) : none;
-    fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", to_string(fix.time),
-                   fix.position.x(), fix.position.y(), fix.position.z(), v.x(), v.y(), v.z(), s.x(), s.y(),
-                   s.z(), sv.x(), sv.y(), sv.z());
+    const Eigen::Vector3d p = fix != nullptr ? fix->position : none;
+    const Eigen::Vector3d v = velocity != nullptr ? velocity->velocity : none;
+    const auto sigmas = [&](const auto* one) {
+      return one != nullptr ? Eigen::Vector3d(one->covariance.diagonal().cwiseSqrt()) : none;
+    };
+    const Eigen::Vector3d s = sigmas(fix), sv = sigmas(velocity);
+    fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", to_string(time),
+                   p.x(), p.y(), p.z(), v.x(), v.y(), v.z(), s.x(), s.y(), s.z(), sv.x(), sv.y(), sv.z());
+  };
+  auto velocity = log.velocities.begin();
+  for (const GnssFix& fix : log.fixes) {
+    for (; velocity != log.velocities.end() && velocity->time < fix.time; ++velocity)
+      add(velocity->time, nullptr, &*velocity);
+    const bool paired = velocity != log.velocities.end() && velocity->time == fix.time;
+    add(fix.time, &fix, paired ? &*velocity : nullptr);
+    if (paired) ++velocity;
   }
+  for (; velocity != log.velocities.end(); ++velocity) add(velocity->time, nullptr, &*velocity);
   return text;
 }
 

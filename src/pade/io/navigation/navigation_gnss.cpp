@@ -6,6 +6,7 @@
 #include <GeographicLib/LocalCartesian.hpp>
 #include <fmt/format.h>
 
+#include "pade/io/navigation/geodetic_fixes.hpp"
 #include "pade/io/navigation/navigation_columns.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/navigation/navigation_table.hpp"
@@ -273,6 +274,19 @@ class LocalFrame {
   std::optional<GeographicLib::LocalCartesian> local_;
 };
 
+/// Many vertical velocities of exactly 0, whose accuracy nobody states, are none: they are left open.
+void leave_level_open(GnssLog& log, std::string_view name, std::vector<std::string>& remarks) {
+  constexpr std::size_t kMany = 10;
+  const bool level =
+      log.velocities.size() >= kMany && std::all_of(log.velocities.begin(), log.velocities.end(),
+                                                    [](const auto& one) { return one.velocity.z() == 0; });
+  if (!level) return;
+  for (GnssVelocity& one : log.velocities)
+    one.covariance(2, 2) = open_vertical_velocity * open_vertical_velocity;
+  remarks.push_back(
+      fmt::format("{}: has no vertical velocity (it is 0 in all rows), which is left open", name));
+}
+
 /// A log at the rate of another sensor repeats each epoch.
 void drop_repeats(GnssLog& log) {
   const auto same_stamp = [](const auto& a, const auto& b) { return a.time == b.time; };
@@ -377,6 +391,7 @@ Result<GnssLog> parse_gnss(std::string_view text, std::string_view name, const G
     if (has_velocity) log.velocities.push_back({*time, *velocity, velocity_covariance});
   }
   drop_repeats(log);
+  if (!layout->velocity_sigma) leave_level_open(log, name, remarks);
   if (log.fixes.empty() && log.velocities.empty())
     return Error{fmt::format("{}: no row with a stamp, a fix and a finite position or velocity; {}", name,
                              table->first_defect(*times))};

@@ -128,45 +128,6 @@ Result<Layout> layout_of(const NumericTable& table) {
                   table.name, table.column_names(), known_layouts())};
 }
 
-/// The norm of the specific force is near gravity most of the time, whatever the vehicle does.
-Status check_units(const std::vector<ImuSample>& samples, std::string_view name) {
-  std::vector<double> force;
-  std::vector<double> rate;
-  for (const ImuSample& sample : samples) {
-    force.push_back(sample.specific_force.norm());
-    rate.push_back(sample.angular_rate.norm());
-  }
-  const double median_force = median(force);
-  if (median_force > 0.7 && median_force < 1.4) {
-    return Error{
-        fmt::format("{}: the specific force is {:.2f} (median norm), expected about {:.2f} m/s²: this is in "
-                    "g; convert it, or "
-                    "write the unit into the heading (ax [g])",
-                    name, median_force, kStandardGravity)};
-  }
-  if (median_force > 700 && median_force < 1400) {
-    return Error{
-        fmt::format("{}: the specific force is {:.0f} (median norm), expected about {:.2f} m/s²: this is in "
-                    "mg; convert it, or "
-                    "write the unit into the heading (ax [mg])",
-                    name, median_force, kStandardGravity)};
-  }
-  if (median_force < 3 || median_force > 40) {
-    return Error{
-        fmt::format("{}: the specific force is {:.3g} (median norm), expected about {:.2f} m/s²: is gravity "
-                    "part of it, and are the columns those of the accelerometers?",
-                    name, median_force, kStandardGravity)};
-  }
-  const double median_rate = median(rate);
-  if (median_rate > 15) {
-    return Error{fmt::format(
-        "{}: the angular rate is {:.1f} (median norm), which no vehicle keeps up in rad/s: this is in deg/s; "
-        "convert it, or write the unit into the heading (gx [deg/s])",
-        name, median_rate)};
-  }
-  return {};
-}
-
 /// Names the line where a clock was set back; smaller steps are jitter, which others look at.
 void remark_step_back(const NumericTable& table, const std::vector<std::optional<Time>>& times,
                       std::vector<std::string>& remarks) {
@@ -184,6 +145,42 @@ void remark_step_back(const NumericTable& table, const std::vector<std::optional
 }
 
 }  // namespace
+
+Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view name, bool has_heading) {
+  if (samples.empty()) return {};
+  std::vector<double> force;
+  std::vector<double> rate;
+  for (const ImuSample& sample : samples) {
+    force.push_back(sample.specific_force.norm());
+    rate.push_back(sample.angular_rate.norm());
+  }
+  const double median_force = median(force);
+  const auto remedy = [&](std::string_view heading) {
+    return has_heading ? fmt::format("convert it, or write the unit into the heading ({})", heading)
+                       : std::string("convert it");
+  };
+  const auto is_in = [&](std::string_view unit) {
+    return Error{fmt::format(
+        "{}: the specific force is {:.4g} (median norm), expected about {:.2f} m/s²: this is in {}; {}", name,
+        median_force, kStandardGravity, unit, remedy(fmt::format("ax [{}]", unit)))};
+  };
+  if (median_force > 0.7 && median_force < 1.4) return is_in("g");
+  if (median_force > 700 && median_force < 1400) return is_in("mg");
+  if (median_force < 3 || median_force > 40) {
+    return Error{
+        fmt::format("{}: the specific force is {:.3g} (median norm), expected about {:.2f} m/s²: is gravity "
+                    "part of it, and are the columns those of the accelerometers?",
+                    name, median_force, kStandardGravity)};
+  }
+  const double median_rate = median(rate);
+  if (median_rate > 15) {
+    return Error{
+        fmt::format("{}: the angular rate is {:.1f} (median norm), which no vehicle keeps up in "
+                    "rad/s: this is in deg/s; {}",
+                    name, median_rate, remedy("gx [deg/s]"))};
+  }
+  return {};
+}
 
 Result<std::vector<ImuSample>> parse_imu(std::string_view text, std::string_view name,
                                          std::vector<std::string>& remarks) {
@@ -221,7 +218,8 @@ Result<std::vector<ImuSample>> parse_imu(std::string_view text, std::string_view
     remarks.push_back(
         fmt::format("{}: {} rows of other IMUs than number {:g} were left out", name, others, instance));
   }
-  if (const Status status = check_units(samples, name); !status.ok()) return status.error();
+  const Status units = check_imu_units(samples, name, true);
+  if (!units) return units.error();
   return samples;
 }
 

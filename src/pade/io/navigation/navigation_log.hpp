@@ -69,12 +69,28 @@ Result<NavigationLog> read_navigation_log(const std::filesystem::path& folder,
 
 /// The sensors of a recording of ROS (recording/recording.hpp): Imu, NavSatFix, the receiver's TwistStamped
 /// (east, north, up), MagneticField, FluidPressure. The IMU's frame is the body. Errors: those of
-/// Recording::open; the IMU or the GNSS is missing; several topics fit and none is named in `topics`.
+/// Recording::open; the IMU or the GNSS is missing; several topics fit and none is named in `topics`; the IMU
+/// counts in g or degrees.
 Result<NavigationLog> read_recording_sensors(const std::filesystem::path& file, std::string_view topics);
+
+/// The sensors of a recording that has not all of them.
+struct RecordedSensors {
+  NavigationLog log;
+  std::vector<std::string> topics;  ///< that were read
+};
+/// The same, where the IMU, the GNSS or both may be missing.
+Result<RecordedSensors> read_some_sensors(const std::filesystem::path& file, std::string_view topics);
+
+/// Whether the samples are in m/s² and rad/s: the norm of the specific force is near gravity most of the
+/// time, whatever the vehicle does. Nothing is said of none.
+/// @param name         of the file, for the message
+/// @param has_heading  which may state another unit
+Status check_imu_units(const std::vector<ImuSample>& samples, std::string_view name, bool has_heading);
 
 /// Our own layout as text, stamps with nine digits where needed; what parse_imu and parse_gnss read back.
 std::string format_imu(const std::vector<ImuSample>& samples);
-/// Rows pair a fix with the velocity of the same stamp; a fix without one gets NaN velocity.
+/// Rows pair a fix with the velocity of the same stamp; where the other is missing it is NaN. Of covariances
+/// the sigmas are kept.
 std::string format_gnss(const GnssLog& log);
 
 }  // namespace pade::io

@@ -225,10 +225,48 @@ std::size_t find_stamp_column(const std::vector<ColumnName>& columns) {
   return 0;
 }
 
+/// The header's stamps, which tell when something was measured: of each row as text. Empty where there are
+/// none, or all are 0.
+std::vector<std::string_view> header_stamps(NumericTable& table, std::size_t stamp,
+                                            std::optional<std::size_t> nanoseconds,
+                                            const std::vector<std::string_view>& texts) {
+  bool any = false;
+  for (std::size_t row = 0; row < table.rows(); ++row) any = any || std::abs(table.at(row, stamp)) > 0;
+  if (!any) return {};
+  if (!nanoseconds) return texts;
+  if (!table.converted) table.converted = std::make_shared<std::deque<std::string>>();
+  std::vector<std::string_view> stamps;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double rest = table.at(row, *nanoseconds);
+    const bool whole = rest >= 0 && rest < 1e9 && texts[row].find('.') == std::string_view::npos;
+    stamps.emplace_back(whole ? table.converted->emplace_back(
+                                    fmt::format("{}.{:09d}", texts[row], static_cast<std::int64_t>(rest)))
+                              : texts[row]);
+  }
+  return stamps;
+}
+
+/// Takes them instead of the times of recording.
+void prefer_header_stamps(NumericTable& table, std::size_t stamp,
+                          const std::vector<std::string_view>& texts) {
+  const auto nanoseconds = table.column(
+      {"header.stamp.nsecs", "header.stamp.nanosec", "stamp.nsecs", "stamp.nanosec", "header.stamp.nsec"});
+  const bool seconds = table.columns[stamp].name != "header.stamp";
+  auto stamps = header_stamps(table, stamp, seconds ? nanoseconds : std::nullopt, texts);
+  if (stamps.empty()) return;
+  if (table.stamp_column != stamp) table.recorded = table.stamp_column;
+  table.stamps = std::move(stamps);
+  table.stamp_column = stamp;
+}
+
 /// What the heading says about its stamps.
 std::optional<TimeUnit> stated_unit(const ColumnName& column) {
-  static constexpr std::array<std::pair<std::string_view, TimeUnit>, 19> kNames = {
-      {{"t_s", TimeUnit::seconds},
+  static constexpr std::array<std::pair<std::string_view, TimeUnit>, 23> kNames = {
+      {{"header.stamp.secs", TimeUnit::seconds},
+       {"header.stamp.sec", TimeUnit::seconds},
+       {"stamp.secs", TimeUnit::seconds},
+       {"stamp.sec", TimeUnit::seconds},
+       {"t_s", TimeUnit::seconds},
        {"__time", TimeUnit::seconds},
        {"time_s", TimeUnit::seconds},
        {"times", TimeUnit::seconds},
@@ -304,8 +342,18 @@ Result<std::vector<std::optional<Time>>> times_of(const NumericTable& table, con
   const ColumnName& column = table.columns[table.stamp_column];
   const auto stated = stated_unit(column);
   const auto guessed = guess_unit(table.stamps, rule.slowest);
-  const TimeUnit unit = stated.value_or(rule.unit.value_or(guessed.value_or(TimeUnit::seconds)));
-  const double step = median_step(table.stamps) * static_cast<double>(nanoseconds_per(unit)) * 1e-9;
+  const auto step_in = [&](TimeUnit unit) {
+    return median_step(table.stamps) * static_cast<double>(nanoseconds_per(unit)) * 1e-9;
+  };
+  TimeUnit unit = stated.value_or(rule.unit.value_or(guessed.value_or(TimeUnit::seconds)));
+  constexpr double kFastest = 1e-5;  // s: no sensor of a log is
+  if (!stated && guessed && *guessed != unit && (step_in(unit) < kFastest || step_in(unit) > rule.slowest)) {
+    remarks.push_back(
+        fmt::format("{}: {} is taken as {}, from its steps, and not as the {} that such logs have",
+                    table.name, column.name, name_of(*guessed), name_of(unit)));
+    unit = *guessed;
+  }
+  const double step = step_in(unit);
   if (step > rule.slowest) {
     const std::string better =
         guessed && *guessed != unit ? fmt::format("; they fit {}", name_of(*guessed)) : std::string();
@@ -318,6 +366,10 @@ Result<std::vector<std::optional<Time>>> times_of(const NumericTable& table, con
     remarks.push_back(fmt::format("{}: the heading gives no unit of time; {} is taken as {}, from its steps",
                                   table.name, column.name, name_of(unit)));
   }
+  if (table.recorded) {
+    remarks.push_back(fmt::format("{}: the times are those of the headers ({}), not those of recording ({})",
+                                  table.name, column.name, table.columns[*table.recorded].name));
+  }
   for (const std::string_view stamp : table.stamps) times.push_back(parse_stamp(stamp, unit));
   return times;
 }
@@ -327,7 +379,9 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
   table.name = name;
   char separator = ',';
   std::size_t line_number = 0;
-  std::string words;  // the last comment that may name columns between blanks
+  std::string words;                        // the last comment that may name columns between blanks
+  std::optional<std::size_t> header;        // column of the stamps of messages of ROS
+  std::vector<std::string_view> of_header;  // of each row
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   while (!text.empty()) {
     const std::string_view whole_line = take(text, '\n');
@@ -370,6 +424,8 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
     }
     if (table.rows() == 0) {
       table.stamp_column = find_stamp_column(table.columns);
+      header =
+          table.column({"header.stamp", "header.stamp.secs", "header.stamp.sec", "stamp.secs", "stamp.sec"});
       table.first_row = line;
     }
     // An empty field at the end of a line of tabs is a field.
@@ -382,6 +438,7 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
       const std::string_view field = trimmed(take(rest, separator));
       table.values.push_back(number_or_nan(field, separator == ';' || separator == '\t'));
       if (i == table.stamp_column) table.stamps.push_back(stamp_of(table, unquoted(field), separator));
+      if (header && i == *header) of_header.push_back(stamp_of(table, unquoted(field), separator));
     }
     table.line_numbers.push_back(line_number);
   }
@@ -393,6 +450,7 @@ Result<NumericTable> parse_table(std::string_view text, std::string_view name) {
                                    table.bad_lines, table.rows() + table.bad_lines, table.width())
                      : fmt::format("{}: no rows below the heading", name)};
   }
+  if (header) prefer_header_stamps(table, *header, of_header);
   return table;
 }
 

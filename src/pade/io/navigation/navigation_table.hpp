@@ -30,12 +30,14 @@ struct NumericTable {
   std::vector<ColumnName> columns;       ///< empty if no heading was found
   std::vector<double> values;            ///< row-major, rows() x width()
   std::vector<std::string_view> stamps;  ///< the field of each row in `stamp_column` as text (into the input)
-  std::size_t stamp_column = 0;          ///< the first column whose name is one of time; else the first
+  std::size_t stamp_column =
+      0;  ///< a header's stamp that is not 0; else the first of a name of time; else the first
   std::vector<std::size_t> line_numbers;  ///< of each row, from 1
   std::size_t bad_lines = 0;              ///< lines with another number of fields, left out
   std::size_t first_bad_line = 0;
-  std::shared_ptr<std::deque<std::string>> converted;  ///< stamps that had decimal commas
-  std::string_view first_row;                          ///< the first line of data, for messages
+  std::shared_ptr<std::deque<std::string>> converted;  ///< stamps with decimal commas, or in two columns
+  std::optional<std::size_t> recorded;  ///< beside a header's stamp: when the message was recorded
+  std::string_view first_row;           ///< the first line of data, for messages
 
   [[nodiscard]] std::size_t width() const { return columns.size(); }
   [[nodiscard]] std::size_t rows() const { return line_numbers.size(); }
@@ -66,8 +68,9 @@ struct StampRule {
   double slowest = 2;                      ///< longest usual step, s
 };
 
-/// The times of all rows (empty if a stamp cannot be read), in the unit that heading or dialect state,
-/// else in the one that the steps fit. Appends a remark if it had to be guessed and is not seconds.
+/// The times of all rows (empty if a stamp cannot be read), in the unit that the heading states, else that of
+/// the dialect if the steps can be such, else in the one that the steps fit. Appends a remark if it had to be
+/// guessed and is not seconds, or contradicts the dialect, and if header and recording state two times.
 /// Errors: a stated unit that the steps contradict.
 Result<std::vector<std::optional<Time>>> times_of(const NumericTable& table, const StampRule& rule,
                                                   std::vector<std::string>& remarks);

@@ -91,6 +91,30 @@ bool is_recording(const fs::path& path) {
   return fs::is_directory(path, failure) ? is_folder_of_one(path) : is_file_of_one(path);
 }
 
+std::optional<std::string> why_no_recording(const fs::path& folder) {
+  std::error_code failure;
+  bool compressed = false, split = false;
+  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    const std::string name = entry->path().filename().string();
+    for (const char* const ending : {".mcap", ".db3", ".bag"}) {
+      split = split || name.ends_with(ending);
+      compressed = compressed || name.ends_with(std::string(ending) + ".zstd") ||
+                   name.ends_with(std::string(ending) + ".zst");
+    }
+  }
+  if (compressed) {
+    return "found recordings that are compressed as a whole (.zstd), expected .mcap, .db3 or .bag: "
+           "decompress "
+           "them (zstd -d), and name the file";
+  }
+  if (split)
+    return "found recordings in it and no metadata.yaml: name the file itself (.mcap, .db3 or .bag), or make "
+           "the "
+           "metadata with ros2 bag reindex";
+  return std::nullopt;
+}
+
 Result<Recording> Recording::open(const fs::path& path) {
   Recording recording;
   recording.file_ = path;

@@ -84,6 +84,10 @@ class Recording {
 /// and a recording in it.
 bool is_recording(const std::filesystem::path& path);
 
+/// What to do about a folder that holds recordings and is none: without metadata.yaml, or compressed as a
+/// whole. Empty if it holds none.
+std::optional<std::string> why_no_recording(const std::filesystem::path& folder);
+
 /// @{
 /// The readers of the formats; `file` stands in messages.
 Result<Recording::Content> read_bag(const std::filesystem::path& file);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pade/core/compute/median.hpp"
+#include "pade/io/text.hpp"
 
 namespace pade::io {
 namespace {
@@ -99,6 +100,25 @@ Eigen::Vector3d chosen_origin(const std::string& origin, std::span<const Pose> c
   if (const auto point = parse_point(origin)) return *point;
   const Eigen::Vector3d near = near_flight(cameras);
   return origin == "flight" || near.cwiseAbs().maxCoeff() > kFarFromOrigin ? near : Eigen::Vector3d::Zero();
+}
+
+std::optional<GeographicOrigin> gnss_origin(const std::filesystem::path& folder) {
+  const auto text = read_file(folder / "gnss.csv");
+  if (!text) return std::nullopt;
+  const std::string_view head = std::string_view(*text).substr(0, text->find('\n'));
+  constexpr std::string_view kKey = "origin=";
+  const std::size_t at = head.find(kKey);
+  if (!head.starts_with('#') || at == std::string_view::npos) return std::nullopt;
+  const auto fields = split_fields(head.substr(at + kKey.size()));
+  if (fields.size() < 3) return std::nullopt;
+  const auto latitude = parse_number(fields[0]);
+  const auto longitude = parse_number(fields[1]);
+  const auto height = parse_number(fields[2]);
+  if (!latitude || !longitude || !height || !(std::abs(*latitude) <= 90) || !(std::abs(*longitude) <= 360) ||
+      !std::isfinite(*height)) {
+    return std::nullopt;
+  }
+  return GeographicOrigin{*latitude, *longitude, *height};
 }
 
 }  // namespace pade::io

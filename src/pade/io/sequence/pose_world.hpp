@@ -1,6 +1,7 @@
 // What the poses of a flight tell about their world: which way is up, and a point near the flight.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,5 +35,8 @@ Eigen::Vector3d near_flight(std::span<const Pose> cameras);
 /// What SequenceOptions::origin asks for: the point of the pose world that becomes 0 0 0. With "auto"
 /// near_flight() if that is farther than 1 km from 0 0 0 in any axis, else zero.
 Eigen::Vector3d chosen_origin(const std::string& origin, std::span<const Pose> cameras);
+
+/// `# frame=ENU origin=lat,lon,h` in the head of the folder's gnss.csv.
+std::optional<GeographicOrigin> gnss_origin(const std::filesystem::path& folder);
 
 }  // namespace pade::io

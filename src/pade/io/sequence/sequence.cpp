@@ -87,14 +87,12 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, Sequ
   int missed = 0;  // since the last frame: the next motion is over all of them
   for (const auto& [source, info] : images) {
     const std::string file = source.file.string();
-    missed += info.size != camera.size() || info.bits != bits ? 1 : 0;
-    if (info.size != camera.size()) {
-      report.skip(file, fmt::format("the image has {} pixels, expected {} as the calibration states",
-                                    size_text(info.size), size_text(camera.size())));
-      continue;
-    }
-    if (info.bits != bits) {
-      report.skip(file, fmt::format("the image has {} bits, expected {} as the others", info.bits, bits));
+    if (info.size != camera.size() || info.bits != bits) {
+      report.skip(file, info.bits != bits
+                            ? fmt::format("the image has {} bits, expected {} as the others", info.bits, bits)
+                            : fmt::format("the image has {} pixels, expected {} as the calibration states",
+                                          size_text(info.size), size_text(camera.size())));
+      ++missed;
       continue;
     }
     const auto pose = listing.trajectory.at({source.time.nanoseconds + offset.nanoseconds}, largest_gap);
@@ -103,13 +101,11 @@ std::vector<FrameEntry> usable_frames(const std::vector<Candidate>& images, Sequ
       ++listing.frames_without_pose;
       continue;
     }
-    const Pose T_world_camera =
-        listing.poses_of_body ? camera_pose(*pose, *calibration.T_body_camera) : *pose;
-    FrameEntry frame{source.time, source.file, T_world_camera, Matrix6d::Zero(), {}};
-    const int left_out = std::exchange(missed, 0);
-    if (const auto known = listing.covariances.find(source.time); known != listing.covariances.end()) {
-      frame.motion_covariance = over_missed(known->second, left_out);
-    }
+    FrameEntry frame{source.time, source.file, *pose, Matrix6d::Zero(), {}};
+    if (listing.poses_of_body) frame.T_world_camera = camera_pose(*pose, *calibration.T_body_camera);
+    if (const auto known = listing.covariances.find(source.time); known != listing.covariances.end())
+      frame.motion_covariance = over_missed(known->second, missed);
+    missed = 0;
     frames.push_back(std::move(frame));
   }
   return frames;
@@ -178,26 +174,6 @@ std::vector<Pose> poses_of(const std::vector<FrameEntry>& frames) {
   std::vector<Pose> poses;
   for (const FrameEntry& frame : frames) poses.push_back(frame.T_world_camera);
   return poses;
-}
-
-/// `# frame=ENU origin=lat,lon,h` in the head of gnss.csv.
-std::optional<GeographicOrigin> gnss_origin(const fs::path& folder) {
-  const auto text = read_file(folder / "gnss.csv");
-  if (!text) return std::nullopt;
-  const std::string_view head = std::string_view(*text).substr(0, text->find('\n'));
-  constexpr std::string_view kKey = "origin=";
-  const std::size_t at = head.find(kKey);
-  if (!head.starts_with('#') || at == std::string_view::npos) return std::nullopt;
-  const auto fields = split_fields(head.substr(at + kKey.size()));
-  if (fields.size() < 3) return std::nullopt;
-  const auto latitude = parse_number(fields[0]);
-  const auto longitude = parse_number(fields[1]);
-  const auto height = parse_number(fields[2]);
-  if (!latitude || !longitude || !height || !(std::abs(*latitude) <= 90) || !(std::abs(*longitude) <= 360) ||
-      !std::isfinite(*height)) {
-    return std::nullopt;
-  }
-  return GeographicOrigin{*latitude, *longitude, *height};
 }
 
 std::string first_reason(const ReadReport& report) {
@@ -486,7 +462,14 @@ const Calibration& Sequence::calibration() const { return data_->listing.calibra
 const Trajectory& Sequence::trajectory() const { return data_->listing.trajectory; }
 bool Sequence::poses_of_body() const { return data_->listing.poses_of_body; }
 bool Sequence::poses_computed() const { return data_->listing.computed; }
-bool Sequence::mask_is_stated() const { return path_exists(data_->folder / "mask.png"); }
+bool Sequence::mask_is_stated() const {
+  return !data_->listing.mask.empty() || path_exists(data_->folder / "mask.png");
+}
+const Matrix6d& Sequence::motion_covariance(std::size_t i) const {
+  return data_->frames[i].motion_covariance;
+}
+const std::optional<Pose>& Sequence::T_imu_camera() const { return data_->listing.T_imu_camera; }
+const std::vector<std::string>& Sequence::sources() const { return data_->listing.sources; }
 std::size_t Sequence::listed_frames() const { return data_->listing.images.size(); }
 std::size_t Sequence::frames_without_pose() const { return data_->listing.frames_without_pose; }
 std::size_t Sequence::motions_without_scale() const { return data_->listing.motions_without_scale; }

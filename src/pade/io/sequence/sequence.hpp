@@ -146,7 +146,14 @@ class Sequence {
 
   [[nodiscard]] bool poses_of_body() const;   ///< trajectory() is the body's
   [[nodiscard]] bool poses_computed() const;  ///< trajectory() is the camera's, at the times of the images
-  [[nodiscard]] bool mask_is_stated() const;  ///< by a mask.png
+  [[nodiscard]] bool mask_is_stated() const;  ///< by a mask.png, or a recording of a live session
+  /// Frame::motion_covariance of frame i.
+  [[nodiscard]] const Matrix6d& motion_covariance(std::size_t i) const;
+  /// Of a recording: how the camera sits on the IMU, if transforms tell it. The IMU need not be at the body
+  /// of the poses.
+  [[nodiscard]] const std::optional<Pose>& T_imu_camera() const;
+  /// Topics of a recording that were read.
+  [[nodiscard]] const std::vector<std::string>& sources() const;
 
   [[nodiscard]] std::size_t listed_frames() const;          ///< in the folder, usable or not
   [[nodiscard]] std::size_t frames_without_pose() const;    ///< skipped because no pose is near in time

@@ -40,8 +40,10 @@ class Ulog {
   ~Ulog() = default;
   /// @}
 
-  /// Errors: no log, or one with features that have to be understood and are not. What is behind damage, or
-  /// cut off, is missing, and said in remarks().
+  /// Errors: no log, or one with features that have to be understood and are not. The format has no
+  /// checksums: a message counts where its size, its letter, its topic and its text are what they can be.
+  /// Where one does not, the next that does is looked for, and what was passed over, or is cut off, is said
+  /// in remarks(). Damage within the numbers of a message is not seen.
   /// @param name  in messages
   static Result<Ulog> parse(std::string bytes, const std::string& name);
 
@@ -65,15 +67,30 @@ class Ulog {
     std::string type;
     std::size_t offset = 0;
   };
+  /// A number that stands for a topic, and how many bytes its rows have: with the filling at their end,
+  /// without, and without that of a last field which is a topic in itself. Empty if nobody knows.
+  struct Subscription {
+    std::size_t topic = 0;
+    std::vector<std::size_t> sizes;
+  };
+  class Damage;
   Status read_definition(std::string_view text);
   void add_topic(std::string_view message);
+  void take(char type, std::string_view message);
+  [[nodiscard]] bool is_possible(char type, std::string_view message, std::size_t at) const;
+  [[nodiscard]] std::optional<std::size_t> end_of_message(std::size_t at) const;
+  [[nodiscard]] bool goes_on(std::size_t at) const;
+  [[nodiscard]] std::optional<std::size_t> next_message(std::size_t at) const;
+  [[nodiscard]] bool has_size_of_its_key(std::string_view keyed) const;
   [[nodiscard]] std::optional<std::size_t> size_of(const std::string& type, int depth) const;
+  [[nodiscard]] std::size_t filling_of(const std::string& type, int depth, int deepest) const;
   [[nodiscard]] std::optional<Place> place_of(const std::string& format, std::string_view field) const;
 
   std::string bytes_;  // rows point into it
   std::map<std::string, std::vector<Field>, std::less<>> formats_;
   std::vector<Topic> topics_;
-  std::map<std::uint16_t, std::size_t> ids_;  // of topics
+  std::map<std::uint16_t, Subscription> ids_;
+  std::size_t appended_ = 0;  // where data was appended to a log that may end within a message; 0: nowhere
   std::vector<std::string> remarks_;
 };
 

@@ -135,9 +135,10 @@ Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file) {
   NavigationLog log;
   log.remarks = ulog->remarks();
   if (const auto* const topic = ulog->find("sensor_combined")) log.imu = imu_of({*ulog, *topic});
+  const std::string damage = log.remarks.empty() ? "" : "; " + log.remarks.front();
   if (log.imu.empty()) {
-    return Error{fmt::format("{}: the IMU is missing: found no usable sensor_combined among its {} topics",
-                             file.string(), ulog->topics().size())};
+    return Error{fmt::format("{}: the IMU is missing: found no usable sensor_combined among its {} topics{}",
+                             file.string(), ulog->topics().size(), damage)};
   }
   std::vector<io::GeodeticFix> fixes;
   for (const char* const name : {"vehicle_gps_position", "sensor_gps"}) {
@@ -147,9 +148,10 @@ Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file) {
     if (!fixes.empty()) log.gnss = io::local_log(fixes, name, log.remarks);
   }
   if (fixes.empty()) {
-    return Error{fmt::format(
-        "{}: the GNSS is missing: found no vehicle_gps_position or sensor_gps with a fix in three dimensions",
-        file.string())};
+    return Error{
+        fmt::format("{}: the GNSS is missing: found no vehicle_gps_position or sensor_gps with a fix in "
+                    "three dimensions{}",
+                    file.string(), damage)};
   }
   if (const auto* const topic = ulog->find("vehicle_magnetometer"))
     log.magnetometer = fields_of({*ulog, *topic});

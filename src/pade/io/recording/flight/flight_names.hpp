@@ -22,6 +22,7 @@ inline constexpr const char* mask = "/pade/mask";
 /// @}
 inline constexpr const char* world_frame = "map";
 inline constexpr const char* body_frame = "base_link";
+inline constexpr const char* imu_frame = "imu_link";  // where it is not the body
 inline constexpr const char* camera_frame = "camera";
 }  // namespace flight_names
 

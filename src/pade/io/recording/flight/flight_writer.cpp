@@ -2,16 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include <GeographicLib/LocalCartesian.hpp>
 #include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include "pade/core/version.hpp"
 #include "pade/io/navigation/geodetic_fixes.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/recording/messages/message_writer.hpp"
 #include "pade/io/sequence/image_file.hpp"
+#include "pade/io/text.hpp"
 
 namespace pade::io {
 namespace {
@@ -20,7 +24,7 @@ namespace names = flight_names;
 
 /// One thing to be written, in the order of time.
 struct Item {
-  enum class Kind : std::uint8_t { image, pose, imu, fix, velocity, field, height };
+  enum class Kind : std::uint8_t { image, pose, motion, imu, fix, velocity, field, height };
   Time time;
   Kind kind;
   std::size_t index;
@@ -31,10 +35,49 @@ void list(std::vector<Item>& items, const Values& values, Item::Kind kind) {
   for (std::size_t i = 0; i < values.size(); ++i) items.push_back({values[i].time, kind, i});
 }
 
-/// The offset between the clocks is taken out of the poses, so that nobody has to know of it.
+Time clock_offset(const Sequence& sequence) {
+  return Time::from_seconds(sequence.calibration().time_offset_s.value_or(0));
+}
+
+/// The offset between the clocks is taken out of poses and sensors, so that nobody has to know of it.
 Time pose_time(const Sequence& sequence, Time row) {
-  const Time offset = Time::from_seconds(sequence.calibration().time_offset_s.value_or(0));
-  return sequence.poses_computed() ? row : Time{row.nanoseconds - offset.nanoseconds};
+  return sequence.poses_computed() ? row : Time{row.nanoseconds - clock_offset(sequence).nanoseconds};
+}
+
+/// The sensors on the clock of the images.
+NavigationLog on_clock_of_images(NavigationLog log, Time offset) {
+  const auto shift = [&](auto& samples) {
+    for (auto& sample : samples) sample.time.nanoseconds -= offset.nanoseconds;
+  };
+  shift(log.imu);
+  shift(log.gnss.fixes);
+  shift(log.gnss.velocities);
+  shift(log.magnetometer);
+  shift(log.barometer);
+  return log;
+}
+
+/// How the IMU sits on the body of the poses; empty where it is the body, or nobody knows.
+std::optional<Pose> imu_on_body(const Sequence& sequence) {
+  const auto& T_body_camera = sequence.calibration().T_body_camera;
+  const auto& T_imu_camera = sequence.T_imu_camera();
+  if (!T_body_camera || !T_imu_camera) return std::nullopt;
+  constexpr double kSame = 1e-9;
+  const Pose T_body_imu = *T_body_camera * T_imu_camera->inverse();
+  if (T_body_imu.translation.norm() < kSame && T_body_imu.rotation.vec().norm() < kSame) return std::nullopt;
+  return T_body_imu;
+}
+
+/// How the camera sits on the body of the poses, else on the IMU.
+std::optional<Pose> camera_on_body(const Sequence& sequence) {
+  const auto& T_body_camera = sequence.calibration().T_body_camera;
+  return T_body_camera ? T_body_camera : sequence.T_imu_camera();
+}
+
+bool has_motions(const Sequence& sequence) {
+  for (std::size_t i = 0; i < sequence.size(); ++i)
+    if (!sequence.motion_covariance(i).isZero(0)) return true;
+  return false;
 }
 
 /// What stays behind, as sentences.
@@ -45,15 +88,36 @@ std::vector<std::string> left_out(const Sequence& sequence) {
     out.push_back(fmt::format("{} of {} frames, which pade map leaves out as well",
                               sequence.listed_frames() - sequence.size(), sequence.listed_frames()));
   }
-  if (sequence.mask_is_stated()) out.emplace_back("mask.png");
   return out;
+}
+
+/// What became something else.
+std::vector<std::string> changed(const Sequence& sequence, const NavigationLog* log) {
+  std::vector<std::string> notes;
+  const Time offset = clock_offset(sequence);
+  if (offset.nanoseconds != 0 && (log != nullptr || !sequence.poses_computed())) {
+    notes.push_back(
+        fmt::format("the offset of {} s between the clocks (time_offset_s) is taken out of the {}{}",
+                    to_string(offset), sequence.poses_computed() ? "" : "poses",
+                    log == nullptr              ? ""
+                    : sequence.poses_computed() ? "sensors"
+                                                : " and the sensors"));
+  }
+  return notes;
 }
 
 /// Writes one flight into one recording.
 class FlightWriter {
  public:
   FlightWriter(const Sequence& sequence, const NavigationLog* log, RecordingWriter& writer)
-      : sequence_(sequence), log_(log), writer_(writer), encoding_(writer.encoding()) {}
+      : sequence_(sequence),
+        T_body_imu_(imu_on_body(sequence)),
+        writer_(writer),
+        encoding_(writer.encoding()) {
+    if (log != nullptr) log_ = on_clock_of_images(*log, clock_offset(sequence));
+    imu_frame_ = T_body_imu_ ? names::imu_frame : names::body_frame;
+    written_.notes = changed(sequence, log);
+  }
 
   Result<WrittenFlight> write(const FlightProgress& progress) {
     written_.left_out = left_out(sequence_);
@@ -62,9 +126,17 @@ class FlightWriter {
     if (calibration.world_up)
       written_.left_out.emplace_back("world_up: give it by --world-up or --calibration");
     if (calibration.origin) written_.left_out.emplace_back("geographic_origin");
-    const std::vector<Item> items = in_order_of_time();
-    if (Status status = write_mounting(items.front().time); !status) return status.error();
-    for (const Item& item : items) {
+    const auto items = in_order_of_time();
+    if (!items) return items.error();
+    const Time start = items->front().time;
+    if (Status status = write_mounting(start); !status) return status.error();
+    if (sequence_.mask_is_stated()) {
+      const Status status =
+          writer_.write(names::mask, "sensor_msgs/Image", start,
+                        write_image({start, names::camera_frame}, sequence_.mask(), encoding_));
+      if (!status) return status.error();
+    }
+    for (const Item& item : *items) {
       if (item.kind == Item::Kind::image && progress && !progress(written_.images))
         return interrupted_error();
       if (Status status = write(item); !status) return status.error();
@@ -73,48 +145,66 @@ class FlightWriter {
   }
 
  private:
-  [[nodiscard]] std::vector<Item> in_order_of_time() const {
+  /// Recordings know the times from 1970 to 2038.
+  static bool has_time(Time time) {
+    constexpr std::int64_t kEnd = 2'147'483'648'000'000'000;
+    return time.nanoseconds >= 0 && time.nanoseconds < kEnd;
+  }
+
+  Result<std::vector<Item>> in_order_of_time() {
     std::vector<Item> items;
-    for (std::size_t i = 0; i < sequence_.size(); ++i)
+    const bool motions = has_motions(sequence_);
+    for (std::size_t i = 0; i < sequence_.size(); ++i) {
+      if (!has_time(sequence_.time(i))) {
+        return Error{
+            fmt::format("{}: the image's time is {} s, expected one from 1970 to 2038, as recordings count: "
+                        "shift the times of the flight, or write a folder",
+                        sequence_.image_file(i).string(), to_string(sequence_.time(i)))};
+      }
       items.push_back({sequence_.time(i), Item::Kind::image, i});
+      if (motions) items.push_back({sequence_.time(i), Item::Kind::motion, i});
+    }
     const auto& rows = sequence_.trajectory().rows();
     for (std::size_t i = 0; i < rows.size(); ++i)
       items.push_back({pose_time(sequence_, rows[i].time), Item::Kind::pose, i});
-    if (log_ != nullptr) {
-      list(items, log_->imu, Item::Kind::imu);
-      list(items, log_->gnss.fixes, Item::Kind::fix);
-      list(items, log_->gnss.velocities, Item::Kind::velocity);
-      list(items, log_->magnetometer, Item::Kind::field);
-      list(items, log_->barometer, Item::Kind::height);
-    }
+    list(items, log_.imu, Item::Kind::imu);
+    list(items, log_.gnss.fixes, Item::Kind::fix);
+    list(items, log_.gnss.velocities, Item::Kind::velocity);
+    list(items, log_.magnetometer, Item::Kind::field);
+    list(items, log_.barometer, Item::Kind::height);
     std::stable_sort(items.begin(), items.end(),
                      [](const Item& a, const Item& b) { return a.time < b.time; });
-    // Recordings know no time before 1970.
-    std::erase_if(items, [](const Item& item) { return item.time.nanoseconds < 0; });
+    const auto count = std::erase_if(items, [](const Item& item) { return !has_time(item.time); });
+    if (count > 0) {
+      written_.left_out.push_back(fmt::format(
+          "{} poses and samples whose times are not between 1970 and 2038, as recordings count", count));
+    }
     return items;
   }
 
   Status write_mounting(Time start) {
     const Calibration& calibration = sequence_.calibration();
-    const MessageHeader header{start, names::body_frame};
-    Status status;
-    if (calibration.T_body_camera) {
-      status =
-          writer_.write(names::transforms, "tf2_msgs/TFMessage", start,
-                        write_transform(header, names::camera_frame, *calibration.T_body_camera, encoding_));
+    std::vector<NamedTransform> mounting;
+    const auto sits = [&](const char* child, const char* parent, const Pose& pose) {
+      mounting.push_back({{start, parent}, child, pose});
+    };
+    if (const auto camera = camera_on_body(sequence_)) sits(names::camera_frame, names::body_frame, *camera);
+    if (T_body_imu_) sits(names::imu_frame, names::body_frame, *T_body_imu_);
+    if (log_.gnss.lever_arm) {
+      sits("gps", imu_frame_, {Eigen::Quaterniond::Identity(), *log_.gnss.lever_arm});
+    } else if (calibration.gnss_lever_arm) {
+      sits("gps", names::body_frame, {Eigen::Quaterniond::Identity(), *calibration.gnss_lever_arm});
     }
-    const bool from_log = log_ != nullptr && log_->gnss.lever_arm.has_value();
-    if (status && (from_log || calibration.gnss_lever_arm)) {
-      const Pose antenna{Eigen::Quaterniond::Identity(),
-                         from_log ? *log_->gnss.lever_arm : *calibration.gnss_lever_arm};
-      status = writer_.write(names::transforms, "tf2_msgs/TFMessage", start,
-                             write_transform(header, "gps", antenna, encoding_));
+    for (const NamedTransform& one : mounting) {
+      const Status status = writer_.write(names::transforms, "tf2_msgs/TFMessage", start,
+                                          write_transform(one.header, one.child, one.pose, encoding_));
+      if (!status) return status;
     }
-    return status;
+    return {};
   }
 
   Status write(const Item& item) {
-    const MessageHeader body{item.time, names::body_frame};
+    const MessageHeader body{item.time, imu_frame_};
     switch (item.kind) {
       case Item::Kind::image:
         return write_image_of(item);
@@ -125,8 +215,13 @@ class FlightWriter {
             write_odometry({item.time, names::world_frame},
                            sequence_.poses_of_body() ? names::body_frame : names::camera_frame,
                            sequence_.trajectory().rows()[item.index].pose, encoding_));
+      case Item::Kind::motion:
+        return writer_.write(
+            names::motion, "geometry_msgs/PoseWithCovarianceStamped", item.time,
+            write_pose_with_covariance({item.time, names::world_frame}, sequence_.pose(item.index),
+                                       sequence_.motion_covariance(item.index), encoding_));
       case Item::Kind::imu: {
-        const ImuSample& sample = log_->imu[item.index];
+        const ImuSample& sample = log_.imu[item.index];
         ++written_.imu;
         return writer_.write(names::imu, "sensor_msgs/Imu", item.time,
                              write_imu(body, sample.angular_rate, sample.specific_force, encoding_));
@@ -134,7 +229,7 @@ class FlightWriter {
       case Item::Kind::fix:
         return write_fix(item);
       case Item::Kind::velocity: {
-        const GnssVelocity& velocity = log_->gnss.velocities[item.index];
+        const GnssVelocity& velocity = log_.gnss.velocities[item.index];
         return writer_.write(
             names::velocity, "geometry_msgs/TwistWithCovarianceStamped", item.time,
             write_velocity({item.time, "gps"}, velocity.velocity, velocity.covariance, encoding_));
@@ -143,12 +238,12 @@ class FlightWriter {
         constexpr double kTeslaPerGauss = 1e-4;
         return writer_.write(
             names::field, "sensor_msgs/MagneticField", item.time,
-            write_magnetic_field(body, kTeslaPerGauss * log_->magnetometer[item.index].field, encoding_));
+            write_magnetic_field(body, kTeslaPerGauss * log_.magnetometer[item.index].field, encoding_));
       }
       case Item::Kind::height:
         return writer_.write(
             names::pressure, "sensor_msgs/FluidPressure", item.time,
-            write_pressure(body, 100 * pressure_at_height(log_->barometer[item.index].height), encoding_));
+            write_pressure(body, 100 * pressure_at_height(log_.barometer[item.index].height), encoding_));
     }
     return {};
   }
@@ -173,8 +268,8 @@ class FlightWriter {
   }
 
   Status write_fix(const Item& item) {
-    const GnssFix& fix = log_->gnss.fixes[item.index];
-    const GeodeticOrigin origin = log_->gnss.origin.value_or(GeodeticOrigin{});
+    const GnssFix& fix = log_.gnss.fixes[item.index];
+    const GeodeticOrigin origin = log_.gnss.origin.value_or(GeodeticOrigin{});
     const GeographicLib::LocalCartesian frame(origin.latitude, origin.longitude, origin.height);
     Eigen::Vector3d place;
     frame.Reverse(fix.position.x(), fix.position.y(), fix.position.z(), place.x(), place.y(), place.z());
@@ -184,7 +279,9 @@ class FlightWriter {
   }
 
   const Sequence& sequence_;
-  const NavigationLog* log_;
+  std::optional<Pose> T_body_imu_;
+  const char* imu_frame_ = names::body_frame;
+  NavigationLog log_;
   RecordingWriter& writer_;
   MessageEncoding encoding_;
   WrittenFlight written_;
@@ -207,9 +304,9 @@ std::string camera_yaml(const Sequence& sequence) {
   }
   text += fmt::format("pose_convention: {}\n",
                       sequence.poses_of_body() ? "body_to_world" : "camera_to_world_optical");
-  if (calibration.T_body_camera) {
-    const Eigen::Matrix3d r = calibration.T_body_camera->matrix3();
-    const Eigen::Vector3d& t = calibration.T_body_camera->translation;
+  if (const auto T_body_camera = camera_on_body(sequence)) {
+    const Eigen::Matrix3d r = T_body_camera->matrix3();
+    const Eigen::Vector3d& t = T_body_camera->translation;
     text += "T_body_camera:";
     for (int i = 0; i < 3; ++i)
       text += fmt::format("{}{}, {}, {}, {}", i == 0 ? " [" : ", ", r(i, 0), r(i, 1), r(i, 2), t(i));
@@ -227,10 +324,30 @@ std::string camera_yaml(const Sequence& sequence) {
   return text;
 }
 
+/// Sensors of an IMU that sits elsewhere in the axes of the body of the poses, whose camera they are told of.
+void turn_into_body(NavigationLog& log, const Pose& T_body_imu, WrittenFlight& written) {
+  for (ImuSample& sample : log.imu) {
+    sample.angular_rate = T_body_imu.rotation * sample.angular_rate;
+    sample.specific_force = T_body_imu.rotation * sample.specific_force;
+  }
+  for (MagneticField& sample : log.magnetometer) sample.field = T_body_imu.rotation * sample.field;
+  if (log.gnss.lever_arm) log.gnss.lever_arm = T_body_imu * *log.gnss.lever_arm;
+  const Eigen::Vector3d& place = T_body_imu.translation;
+  written.notes.emplace_back("the IMU's samples are turned into the axes of the body of the poses");
+  if (place.norm() > 0)
+    written.left_out.push_back(
+        fmt::format("the place of the IMU, {:.3f} {:.3f} {:.3f} m from the body of the poses", place.x(),
+                    place.y(), place.z()));
+}
+
 /// The sensors as the project's own tables.
 Status write_tables(const NavigationLog& log, const OutputFolder& folder) {
-  if (Status status = folder.write("imu.csv", format_imu(log.imu)); !status) return status;
-  if (Status status = folder.write("gnss.csv", format_gnss(log.gnss)); !status) return status;
+  if (!log.imu.empty()) {
+    if (Status status = folder.write("imu.csv", format_imu(log.imu)); !status) return status;
+  }
+  if (!log.gnss.fixes.empty() || !log.gnss.velocities.empty()) {
+    if (Status status = folder.write("gnss.csv", format_gnss(log.gnss)); !status) return status;
+  }
   if (!log.barometer.empty()) {
     std::string text = "t_s,height_m,sigma_m\n";
     for (const BarometricHeight& h : log.barometer)
@@ -242,6 +359,27 @@ Status write_tables(const NavigationLog& log, const OutputFolder& folder) {
   for (const MagneticField& m : log.magnetometer)
     text += fmt::format("{},{},{},{}\n", to_string(m.time), m.field.x(), m.field.y(), m.field.z());
   return folder.write("mag.csv", text);
+}
+
+/// mask.png as it is, or of a mask that a recording states.
+Status write_mask(const Sequence& sequence, const OutputFolder& folder, WrittenFlight& written) {
+  if (!sequence.mask_is_stated()) return {};
+  if (const auto file = sequence.folder() / "mask.png"; path_exists(file)) {
+    const auto bytes = read_file(file);
+    return bytes ? folder.write("mask.png", *bytes) : Status(bytes.error());
+  }
+  if (sequence.raw_camera().distortion != Distortion::none) {
+    written.left_out.emplace_back("the mask, which is of the undistorted images");
+    return {};
+  }
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".png", sequence.mask(), bytes)) return Error{"mask.png: cannot be written as PNG"};
+  return folder.write("mask.png", std::span<const unsigned char>(bytes));
+}
+
+bool has_correlations(const GnssLog& gnss) {
+  return std::any_of(gnss.fixes.begin(), gnss.fixes.end(),
+                     [](const GnssFix& fix) { return !fix.covariance.isDiagonal(); });
 }
 
 }  // namespace
@@ -258,6 +396,10 @@ Result<WrittenFlight> write_flight(const Sequence& sequence, const NavigationLog
                                    const OutputFolder& folder, const FlightProgress& progress) {
   WrittenFlight written;
   written.left_out = left_out(sequence);
+  written.notes = changed(sequence, log);
+  if (has_motions(sequence))
+    written.left_out.emplace_back("the covariances of the motions between the frames");
+  if (Status status = write_mask(sequence, folder, written); !status) return status.error();
   for (std::size_t i = 0; i < sequence.size(); ++i) {
     if (progress && !progress(i)) return interrupted_error();
     const auto image = sequence.encoded_image(i);
@@ -275,7 +417,11 @@ Result<WrittenFlight> write_flight(const Sequence& sequence, const NavigationLog
   if (log != nullptr) {
     written.imu = log->imu.size();
     written.fixes = log->gnss.fixes.size();
-    if (Status status = write_tables(*log, folder); !status) return status.error();
+    NavigationLog sensors = on_clock_of_images(*log, clock_offset(sequence));
+    if (has_correlations(sensors.gnss))
+      written.left_out.emplace_back("the correlations of the GNSS positions");
+    if (const auto T_body_imu = imu_on_body(sequence)) turn_into_body(sensors, *T_body_imu, written);
+    if (Status status = write_tables(sensors, folder); !status) return status.error();
   }
   return written;
 }

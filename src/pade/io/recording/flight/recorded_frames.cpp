@@ -16,9 +16,8 @@ bool same(const Pose& a, const Pose& b) {
   return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
 }
 
-/// What was said of one child.
+/// What was said of one child by one parent.
 struct Said {
-  std::string parent;
   TrajectoryBuilder rows{""};
   std::size_t count = 0;
   bool fixed = false;
@@ -32,7 +31,7 @@ std::string frame_name(std::string_view name) {
 }
 
 Result<RecordedFrames> RecordedFrames::read(const Recording& recording, ReadReport& report) {
-  std::map<std::string, Said> said;
+  std::map<std::string, std::map<std::string, Said>> said;  // child, parent
   for (const Topic& topic : recording.topics()) {
     const auto encoding = message_encoding(topic.encoding);
     if (!encoding || (topic.type != "tf2_msgs/TFMessage" && topic.type != "tf/tfMessage")) continue;
@@ -47,19 +46,32 @@ Result<RecordedFrames> RecordedFrames::read(const Recording& recording, ReadRepo
       }
       for (const PoseMessage& transform : *transforms) {
         const std::string child = frame_name(transform.child);
-        const std::string parent = frame_name(transform.header.frame);
-        const auto [entry, added] =
-            said.try_emplace(child, Said{parent, TrajectoryBuilder(topic.name + " " + child)});
-        if (entry->second.parent != parent) continue;  // a second parent: the first one is believed
-        entry->second.fixed = entry->second.fixed || fixed;
+        Said& entry = said[child]
+                          .try_emplace(frame_name(transform.header.frame),
+                                       Said{TrajectoryBuilder(topic.name + " " + child)})
+                          .first->second;
+        entry.fixed = entry.fixed || fixed;
         const Time stamp =
             transform.header.stamp.nanoseconds == 0 ? topic.messages[i].time : transform.header.stamp;
-        entry->second.rows.add(++entry->second.count, stamp, transform.position, transform.xyzw);
+        entry.rows.add(++entry.count, stamp, transform.position, transform.xyzw);
       }
     }
   }
   RecordedFrames frames;
-  for (auto& [child, what] : said) {
+  for (auto& [child, parents] : said) {
+    // Of several parents the one that speaks most; /tf_static says a thing once, and counts as a few.
+    constexpr std::size_t kOnce = 10;
+    const auto weight = [](const auto& one) { return one.second.count + (one.second.fixed ? kOnce : 0); };
+    auto best = parents.begin();
+    for (auto one = parents.begin(); one != parents.end(); ++one)
+      if (weight(*one) > weight(*best)) best = one;
+    for (auto one = parents.begin(); one != parents.end(); ++one) {
+      if (one == best) continue;
+      report.skip(child, fmt::format("{} transforms from {} are not used: {} from {} say otherwise",
+                                     one->second.count, in_quotes(one->first), best->second.count,
+                                     in_quotes(best->first)));
+    }
+    auto& [parent, what] = *best;
     ReadReport repeated;  // of one stamp: usual in /tf, and harmless
     auto rows = what.rows.finish(repeated);
     if (!rows) {
@@ -69,7 +81,7 @@ Result<RecordedFrames> RecordedFrames::read(const Recording& recording, ReadRepo
     const bool still = std::all_of(rows->rows().begin(), rows->rows().end(), [&](const StampedPose& row) {
       return same(row.pose, rows->rows().front().pose);
     });
-    frames.edges_[child] = {what.parent, std::move(*rows), what.fixed || still};
+    frames.edges_[child] = {parent, std::move(*rows), what.fixed || still};
   }
   return frames;
 }

@@ -72,6 +72,32 @@ Result<ImageInfo> info_of(const ImageMessage& image) {
 
 bool is_compressed(const Topic& topic) { return topic.type == "sensor_msgs/CompressedImage"; }
 
+/// Of the pixels in a CompressedImage, as image_transport writes it: "bayer_rggb8; jpeg compressed " for what
+/// was sent, or "bayer_rggb8; jpeg compressed bgr8", where it was converted before.
+std::string_view encoding_inside(std::string_view format) {
+  constexpr std::string_view kKey = "compressed ";
+  const std::size_t semicolon = format.find(';');
+  if (semicolon == std::string_view::npos) return {};
+  if (const std::size_t at = format.find(kKey, semicolon); at != std::string_view::npos) {
+    const std::string_view inside = format.substr(at + kKey.size());
+    const std::string_view word = inside.substr(0, inside.find(' '));
+    if (!word.empty()) return word;
+  }
+  return format.substr(0, semicolon);
+}
+
+/// Pixels as they were sent, in grey or BGR.
+Result<cv::Mat> converted(const cv::Mat& sent, const PixelEncoding& encoding) {
+  if (encoding.conversion == kAsItIs) return sent.clone();
+  cv::Mat pixels;
+  try {  // OpenCV throws on sizes that a pattern cannot have
+    cv::cvtColor(sent, pixels, encoding.conversion);
+  } catch (const std::exception&) {
+    return Error{fmt::format("{} x {} pixels of {} cannot be decoded", sent.cols, sent.rows, encoding.name)};
+  }
+  return pixels;
+}
+
 /// Reads the images of one topic by the names that they were listed under.
 class RecordedStore : public ImageStore {
  public:
@@ -83,8 +109,11 @@ class RecordedStore : public ImageStore {
   [[nodiscard]] Result<ImageInfo> inspect(const fs::path& image) const override {
     const std::string name = image.string();
     if (compressed_) {
-      const auto bytes = file_bytes(name);
-      return bytes ? inspect_image_bytes(*bytes, name) : bytes.error();
+      const auto file = compressed(name);
+      if (!file) return file.error();
+      auto info = inspect_image_bytes(file->bytes, name);
+      if (info && file->mosaic != nullptr) info->channels = 3;
+      return info;
     }
     const MessagePlace& place = places_.at(name);
     const auto bytes = recording_->read(place, kHeadBytes);
@@ -104,8 +133,16 @@ class RecordedStore : public ImageStore {
   [[nodiscard]] Result<cv::Mat> read(const fs::path& image) const override {
     const std::string name = image.string();
     if (compressed_) {
-      const auto bytes = file_bytes(name);
-      return bytes ? read_image_bytes(*bytes, name) : bytes.error();
+      const auto file = compressed(name);
+      if (!file) return file.error();
+      const auto stored = read_image_bytes(file->bytes, name);
+      if (!stored || file->mosaic == nullptr) return stored;
+      if (stored->depth() != CV_8U)
+        return named(
+            name, Error{fmt::format("found {} bits of a Bayer mosaic, expected 8", 8 * stored->elemSize1())});
+      auto colours = converted(*stored, *file->mosaic);
+      if (!colours) return named(name, colours.error());
+      return colours;
     }
     const auto bytes = recording_->read(places_.at(name));
     if (!bytes) return bytes.error();
@@ -118,9 +155,10 @@ class RecordedStore : public ImageStore {
 
   [[nodiscard]] Result<EncodedImage> encoded(const fs::path& image) const override {
     if (compressed_) {
-      auto bytes = file_bytes(image.string());
-      if (!bytes) return bytes.error();
-      return EncodedImage{bytes->starts_with("\x89PNG") ? ".png" : ".jpg", std::move(*bytes)};
+      auto file = compressed(image.string());
+      if (!file) return file.error();
+      if (file->mosaic == nullptr)
+        return EncodedImage{file->bytes.starts_with("\x89PNG") ? ".png" : ".jpg", std::move(file->bytes)};
     }
     const auto pixels = read(image);
     if (!pixels) return pixels.error();
@@ -135,12 +173,25 @@ class RecordedStore : public ImageStore {
     return Error{fmt::format("{}: {}", name, error.message)};
   }
   /// PNG or JPEG of a CompressedImage.
-  [[nodiscard]] Result<std::string> file_bytes(const std::string& name) const {
-    auto bytes = recording_->read(places_.at(name));
-    if (!bytes) return bytes;
+  struct Compressed {
+    std::string bytes;
+    const PixelEncoding* mosaic = nullptr;  ///< if a grey picture stands for colours
+  };
+  [[nodiscard]] Result<Compressed> compressed(const std::string& name) const {
+    const auto bytes = recording_->read(places_.at(name));
+    if (!bytes) return bytes.error();
     const auto message = read_compressed_image(*bytes, encoding_);
     if (!message) return named(name, message.error());
-    return std::string(message->data);
+    Compressed file{std::string(message->data), nullptr};
+    const std::string_view pixels = encoding_inside(message->format);
+    if (!pixels.starts_with("bayer_")) return file;
+    const auto info = inspect_image_bytes(file.bytes, name);
+    if (!info) return info.error();
+    if (info->channels != 1) return file;
+    file.mosaic = pixel_encoding(pixels);
+    if (file.mosaic == nullptr)
+      return named(name, Error{fmt::format("found the encoding {}, expected bayer_*8", in_quotes(pixels))});
+    return file;
   }
 
   std::shared_ptr<const Recording> recording_;
@@ -162,17 +213,9 @@ Result<cv::Mat> pixels_of(const ImageMessage& image) {
   }
   const cv::Mat view(info->size, encoding.type, const_cast<char*>(image.data.data()),
                      image.step);  // NOLINT: only read
-  cv::Mat pixels;
-  if (encoding.conversion == kAsItIs) {
-    pixels = view.clone();
-  } else {
-    try {  // OpenCV throws on sizes that a pattern cannot have
-      cv::cvtColor(view, pixels, encoding.conversion);
-    } catch (const std::exception&) {
-      return Error{
-          fmt::format("{} x {} pixels of {} cannot be decoded", image.width, image.height, image.encoding)};
-    }
-  }
+  auto sent = converted(view, encoding);
+  if (!sent) return sent.error();
+  cv::Mat pixels = std::move(*sent);
   if (info->bits == 16 && image.big_endian != (std::endian::native == std::endian::big)) {
     for (int y = 0; y < pixels.rows; ++y) {
       auto* const values = pixels.ptr<std::uint16_t>(y);
@@ -201,28 +244,37 @@ bool is_camera_topic(const Recording& recording, const Topic& topic) {
   return !head || (!head->encoding.starts_with("16UC1") && !head->encoding.starts_with("32"));
 }
 
-Result<std::vector<Time>> stamps_of(const Recording& recording, const Topic& topic, ReadReport& report) {
+Result<std::vector<std::optional<Time>>> stamps_of(const Recording& recording, const Topic& topic,
+                                                   ReadReport& report) {
   const auto encoding = message_encoding(topic.encoding);
   if (!encoding)
     return Error{fmt::format("{}: topic {} is written as {}, expected ros1 or cdr", recording.file().string(),
                              topic.name, in_quotes(topic.encoding))};
-  std::vector<Time> stamps;
+  std::vector<std::optional<Time>> stamps;
   std::size_t silent = 0;
   for (const MessagePlace& place : topic.messages) {
     const auto bytes = recording.read(place, kHeadBytes);
     if (!bytes) return bytes.error();
     const auto header = read_header(*bytes, *encoding);
-    const Time stamp = header ? header->stamp : Time{};
-    if (stamp.nanoseconds == 0) ++silent;
-    stamps.push_back(stamp);
+    stamps.emplace_back();
+    if (header && header->stamp.nanoseconds != 0) {
+      stamps.back() = header->stamp;
+    } else {
+      ++silent;
+    }
   }
   if (silent == 0) return stamps;
+  if (2 * silent < stamps.size()) {
+    report.notes.push_back(fmt::format("{}: {} of {} messages have no stamp in their header and are left out",
+                                       topic.name, silent, stamps.size()));
+    return stamps;
+  }
   report.notes.push_back(
       fmt::format("{}: {} of {} messages have no stamp in their header: the times of recording are "
                   "taken",
                   topic.name, silent, stamps.size()));
   std::transform(topic.messages.begin(), topic.messages.end(), stamps.begin(),
-                 [](const MessagePlace& place) { return place.time; });
+                 [](const MessagePlace& place) { return std::optional(place.time); });
   return stamps;
 }
 
@@ -238,7 +290,9 @@ Result<RecordedImages> recorded_images(std::shared_ptr<const Recording> recordin
   const fs::path folder = fs::path(recording->file().string() + topic.name);
   auto store = std::make_shared<RecordedStore>(recording, is_compressed(topic), encoding);
   for (std::size_t i = 0; i < stamps->size(); ++i) {
-    found.images.push_back({(*stamps)[i], folder / to_string((*stamps)[i])});
+    const auto time = (*stamps)[i];
+    if (!time) continue;
+    found.images.push_back({*time, folder / to_string(*time)});
     store->add(found.images.back().name, topic.messages[i]);
   }
   found.store = std::move(store);

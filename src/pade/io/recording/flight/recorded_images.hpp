@@ -2,7 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "pade/io/recording/messages/messages.hpp"
 #include "pade/io/recording/recording.hpp"
@@ -34,8 +37,10 @@ bool is_camera_topic(const Recording& recording, const Topic& topic);
 /// bytes than its rows need.
 Result<cv::Mat> pixels_of(const ImageMessage& image);
 
-/// When the messages of a topic were made: by their headers, or where one of them says nothing, when they
-/// were recorded, with a note. Errors: a message is too short for a header.
-Result<std::vector<Time>> stamps_of(const Recording& recording, const Topic& topic, ReadReport& report);
+/// When the messages of a topic were made: by their headers. Where most headers say nothing, when they were
+/// recorded; where a few do, those are empty and to be left out: both with a note. Errors: the topic is
+/// written in a way that is not understood.
+Result<std::vector<std::optional<Time>>> stamps_of(const Recording& recording, const Topic& topic,
+                                                   ReadReport& report);
 
 }  // namespace pade::io

@@ -157,8 +157,10 @@ Result<ImuMessage> read_imu_message(std::string_view bytes, MessageEncoding enco
   reader.numbers(covariance);
   imu.angular_rate = reader.vector();
   reader.numbers(covariance);
+  imu.has_rate = covariance[0] != -1 || !imu.angular_rate.isZero(0);
   imu.specific_force = reader.vector();
   reader.numbers(covariance);
+  imu.has_force = covariance[0] != -1 || !imu.specific_force.isZero(0);
   return whole(reader, std::move(imu), bytes.size());
 }
 

@@ -92,6 +92,7 @@ struct CameraInfoMessage {
 struct ImuMessage {
   MessageHeader header;
   Eigen::Vector3d angular_rate, specific_force;  ///< axes of the frame, rad/s, m/s²
+  bool has_rate = true, has_force = true;  ///< false: zeros, whose covariance says that nobody measures them
 };
 /// sensor_msgs/NavSatFix.
 struct NavSatFixMessage {

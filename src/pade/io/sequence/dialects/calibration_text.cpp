@@ -199,6 +199,13 @@ Result<Calibration> read_ros_ini(const std::vector<Section>& sections, const std
   Camera camera{
       static_cast<int>(width[0]), static_cast<int>(height[0]), k[0], k[4], k[2], k[5], Distortion::none, {}};
   const std::vector<double> d = value(sections[at], "distortion");
+  if (d.size() ==
+      4) {  // camera_calibration writes 5 of plumb_bob and 4 of fisheye, and this form has no model
+    return Error{
+        fmt::format("{}: line {}: section [{}] has 4 coefficients and no word of their model, fisheye or "
+                    "plumb_bob, expected 5 or 8: give the ost.yaml that lies beside it",
+                    file, sections[at].line, sections[at].name)};
+  }
   const char* model = d.empty() ? "none" : d.size() == 8 ? "rational_polynomial" : "plumb_bob";
   if (const auto problem = set_distortion(camera, model, d))
     return Error{fmt::format("{}: line {}: {}", file, sections[at].line, *problem)};

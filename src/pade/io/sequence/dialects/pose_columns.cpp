@@ -78,13 +78,18 @@ std::optional<TimeUnit> unit_in(std::string_view part) {
 }
 
 /// What columns of time are called, as plain() leaves it.
-constexpr std::array<std::string_view, 19> kTimes = {
-    "timestamp", "time",        "ts",       "times",       "t",      "stamp",      "timestampns",
-    "timens",    "timestampus", "timeus",   "timestampms", "timems", "timestamps", "headerstamp",
-    "tsec",      "stampsecs",   "stampsec", "secs",        "sec"};
+constexpr std::array<std::string_view, 16> kTimes = {
+    "timestamp",   "time",   "ts",          "times",  "t",          "stamp", "timestampns", "timens",
+    "timestampus", "timeus", "timestampms", "timems", "timestamps", "tsec",  "secs",        "sec"};
+/// Of the header of a message of ROS: when it was measured. The others are when it was recorded.
+constexpr std::array<std::string_view, 3> kStamps = {"headerstamp", "stampsecs", "stampsec"};
 
 void find_time(const Fields& parts, const Names& names, PoseColumns& columns) {
   columns.time = column_of(names, kTimes);
+  if (const auto stamp = column_of(names, kStamps)) {
+    columns.recorded = columns.time;
+    columns.time = stamp;
+  }
   if (!columns.time) return;
   columns.unit = unit_in(parts[*columns.time]);
   const std::string& name = names[*columns.time];
@@ -211,7 +216,8 @@ Result<std::optional<PoseColumns>> named_columns(std::string_view text, std::siz
       const bool bare = parts.size() == 7 || column_of({plain(parts.front())}, {"x", "tx", "px"});
       if (!found->time && !bare) refusal = refused(file, number, parts, "none of them a time");
     } else if (is_heading(parts) &&
-               (!comment || (parts.size() == fields && column_of({plain(parts.front())}, kTimes)))) {
+               (!comment || (parts.size() == fields && (column_of({plain(parts.front())}, kTimes) ||
+                                                        column_of({plain(parts.front())}, kStamps))))) {
       columns.reset();
       refusal = refused(file, number, parts, "which are no pose that is understood");
     }

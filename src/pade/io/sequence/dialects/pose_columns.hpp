@@ -20,12 +20,13 @@ struct PoseColumns {
   std::optional<std::size_t> time;
   std::optional<std::size_t> nanoseconds;  ///< beside a time in whole seconds
   std::optional<TimeUnit> unit;            ///< if the heading states it
+  std::optional<std::size_t> recorded;     ///< beside a header's stamp: when the message was recorded
   std::array<std::size_t, 3> position{};
   std::array<std::size_t, 4> xyzw{};
   std::size_t least = 0;  ///< fields of a row
 
   /// time x y z qx qy qz qw
-  static PoseColumns tum() { return {0, {}, {}, {1, 2, 3}, {4, 5, 6, 7}, 8}; }
+  static PoseColumns tum() { return {0, {}, {}, {}, {1, 2, 3}, {4, 5, 6, 7}, 8}; }
 };
 
 /// The fields of a row: between semicolons if it has any, else as split_fields; one that is empty at the end

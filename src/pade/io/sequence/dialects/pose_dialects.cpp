@@ -23,7 +23,7 @@ bool is_nanoseconds(std::string_view stamp) {
 /// The columns of rows without a heading, from one of them.
 PoseColumns counted_columns(std::string_view line) {
   const Fields fields = pose_fields(line);
-  if (fields.size() == 7) return {{}, {}, {}, {0, 1, 2}, {3, 4, 5, 6}, 7};
+  if (fields.size() == 7) return {{}, {}, {}, {}, {0, 1, 2}, {3, 4, 5, 6}, 7};
   const bool euroc = is_nanoseconds(fields[0]) && line.find(',') != std::string_view::npos;
   PoseColumns columns = PoseColumns::tum();
   if (euroc) columns.xyzw = {5, 6, 7, 4};
@@ -116,9 +116,29 @@ std::optional<Time> time_of(const Fields& fields, const PoseColumns& columns, Ti
   return Time{time->nanoseconds + rest->nanoseconds};
 }
 
-Result<Trajectory> parse_columns(const std::vector<Line>& lines, const std::string& file,
-                                 const PoseColumns& columns, std::span<const Time> images,
-                                 ReadReport& report) {
+/// Takes the times of recording where the headers have no stamps, and says which are taken.
+void choose_times(const std::vector<Line>& lines, const std::string& file, PoseColumns& columns,
+                  ReadReport& report) {
+  if (!columns.recorded) return;
+  const bool stamped = std::any_of(lines.begin(), lines.end(), [&](const Line& line) {
+    const Fields fields = pose_fields(line.text);
+    return *columns.time < fields.size() && parse_number(fields[*columns.time]).value_or(0) != 0;
+  });
+  if (stamped) {
+    report.notes.push_back(
+        fmt::format("{}: the times are those of the headers (header.stamp), not those of recording", file));
+    return;
+  }
+  columns.time = columns.recorded;
+  columns.nanoseconds.reset();
+  columns.unit.reset();
+  report.notes.push_back(
+      fmt::format("{}: the headers have no stamps: the times of recording are taken", file));
+}
+
+Result<Trajectory> parse_columns(const std::vector<Line>& lines, const std::string& file, PoseColumns columns,
+                                 std::span<const Time> images, ReadReport& report) {
+  choose_times(lines, file, columns, report);
   std::vector<std::string_view> stamps;
   for (const Line& line : lines) {
     const Fields fields = pose_fields(line.text);

@@ -19,6 +19,16 @@
 namespace pade::io {
 namespace {
 
+/// Whether a topic is that of rectified images: "/left/image_rect_color", and not "/direct/image_corrected".
+bool is_rectified(std::string_view name) {
+  while (!name.empty()) {
+    const std::size_t end = std::min(name.find_first_of("/_"), name.size());
+    if (name.substr(0, end) == "rect" || name.substr(0, end) == "rectified") return true;
+    name.remove_prefix(std::min(end + 1, name.size()));
+  }
+  return false;
+}
+
 constexpr double kLargestGap = 0.5;  // between rows of a transform that others are composed with, s
 
 /// A recording being read as a sequence.
@@ -36,6 +46,7 @@ class RecordingLayout {
     if (!frames) return frames.error();
     frames_ = std::move(*frames);
     if (Status status = find_calibration(); !status) return status.error();
+    find_imu();
     if (Status status = choice_.computed ? place_on_imu() : find_poses(); !status) return status.error();
     if (Status status = read_mask(); !status) return status.error();
     return std::move(listing_);
@@ -52,13 +63,21 @@ class RecordingLayout {
       return topic->name == flight_names::mask ||
              (!topics_.names(*topic) && !is_camera_topic(*recording_, *topic));
     });
-    // image_raw/compressed beside image_raw: the same pictures, without losses.
+    // image_raw/compressed beside image_raw: the same pictures, without losses; unless some are missing.
     const std::vector<const Topic*> all = candidates;
-    std::erase_if(candidates, [&](const Topic* topic) {
-      return !topics_.names(*topic) && std::any_of(all.begin(), all.end(), [&](const Topic* other) {
-        return other->name + "/compressed" == topic->name;
-      });
-    });
+    for (const Topic* const raw : all) {
+      for (const Topic* const compressed : all) {
+        if (raw->name + "/compressed" != compressed->name) continue;
+        const bool fewer = 10 * raw->messages.size() < 9 * compressed->messages.size();
+        const Topic* const left_out = fewer ? raw : compressed;
+        if (topics_.names(*left_out)) continue;
+        std::erase(candidates, left_out);
+        if (fewer)
+          report_.notes.push_back(fmt::format("{}: has {} images, {} has {}: the latter is taken", raw->name,
+                                              raw->messages.size(), compressed->name,
+                                              compressed->messages.size()));
+      }
+    }
     const auto chosen = topics_.among(*recording_, candidates, "images");
     if (!chosen) return chosen.error();
     if (*chosen == nullptr) {
@@ -69,6 +88,7 @@ class RecordingLayout {
           list_of(everything)));
     }
     image_topic_ = *chosen;
+    listing_.sources.push_back(image_topic_->name);
     auto images = recorded_images(recording_, **chosen, report_);
     if (!images) return images.error();
     for (RecordedImage& image : images->images)
@@ -89,7 +109,22 @@ class RecordingLayout {
     for (const Topic* const topic : candidates) {
       if (!any_named && topic->name == beside) return topic;
     }
-    return topics_.among(*recording_, candidates, "calibrations of cameras");
+    const auto chosen = topics_.among(*recording_, candidates, "calibrations of cameras");
+    if (!chosen || *chosen == nullptr || topics_.names(**chosen)) return chosen;
+    const auto bytes = recording_->read((*chosen)->messages.front());
+    if (!bytes) return bytes.error();
+    const auto header = read_header(*bytes, *message_encoding((*chosen)->encoding));
+    const std::string frame = header ? frame_name(header->frame) : std::string();
+    if (!frame.empty() && !camera_frame_.empty() && frame != camera_frame_) {
+      return error(
+          fmt::format("the only calibration, {}, is that of {}, and the images of {} are of {}, expected "
+                      "theirs: give it by "
+                      "--calibration, or name this one with --topics if it is",
+                      (*chosen)->name, in_quotes(frame), image_topic_->name, in_quotes(camera_frame_)));
+    }
+    report_.notes.push_back(
+        fmt::format("{}: taken as the calibration of {}", (*chosen)->name, image_topic_->name));
+    return chosen;
   }
 
   Status find_calibration() {
@@ -100,6 +135,7 @@ class RecordingLayout {
     if (!topic && choice_.calibration_file.empty()) return topic.error();
     if (topic && *topic != nullptr) {
       if (Status status = read_camera(**topic, own); !status) return status;
+      listing_.sources.push_back((*topic)->name);
     }
     LayoutChoice choice = choice_;
     choice.mounting_alone = own.camera.has_value();
@@ -127,14 +163,13 @@ class RecordingLayout {
             fmt::format("{}: the calibration changes: that of the start is taken", topic.name));
       if (!first) first = std::move(*info);
     }
+    if (is_rectified(image_topic_->name))
+      report_.notes.push_back(fmt::format("{}: taken as rectified by its name: P of {} is the camera",
+                                          image_topic_->name, topic.name));
     auto camera = camera_of(*first);
     if (!camera) return error(fmt::format("{}: {}", topic.name, camera.error().message));
     calibration.camera = *camera;
     return {};
-  }
-
-  [[nodiscard]] bool images_are_rectified() const {
-    return image_topic_->name.find("rect") != std::string::npos;
   }
 
   Result<Camera> camera_of(const CameraInfoMessage& info) const {
@@ -143,7 +178,7 @@ class RecordingLayout {
     Camera camera;
     camera.width = static_cast<int>(std::min<std::uint32_t>(info.width, 1U << 20));
     camera.height = static_cast<int>(std::min<std::uint32_t>(info.height, 1U << 20));
-    const bool rectified = images_are_rectified();
+    const bool rectified = is_rectified(image_topic_->name);
     constexpr std::array<double, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     if (rectified && info.r != kIdentity) {
       return Error{
@@ -169,16 +204,22 @@ class RecordingLayout {
     return camera;
   }
 
+  /// How the camera sits on the IMU, if there is one and transforms tell it.
+  void find_imu() {
+    const auto imu = topics_.among(*recording_, topics_of(*recording_, {"sensor_msgs/Imu"}), "IMUs");
+    if (!imu || *imu == nullptr) return;
+    const auto bytes = recording_->read((*imu)->messages.front());
+    if (!bytes) return;
+    const auto header = read_header(*bytes, *message_encoding((*imu)->encoding));
+    if (header) listing_.T_imu_camera = frames_.fixed(frame_name(header->frame), camera_frame_);
+  }
+
   /// Poses come from the body's sensors: the IMU is the body.
   Status place_on_imu() {
     if (listing_.calibration.T_body_camera) return {};
     const auto imu = topics_.among(*recording_, topics_of(*recording_, {"sensor_msgs/Imu"}), "IMUs");
     if (!imu) return imu.error();
-    if (*imu == nullptr) return {};
-    const auto bytes = recording_->read((*imu)->messages.front());
-    if (!bytes) return bytes.error();
-    const auto header = read_header(*bytes, *message_encoding((*imu)->encoding));
-    if (header) listing_.calibration.T_body_camera = frames_.fixed(frame_name(header->frame), camera_frame_);
+    listing_.calibration.T_body_camera = listing_.T_imu_camera;
     return {};
   }
 
@@ -226,6 +267,7 @@ class RecordingLayout {
     }
     listing_.trajectory = Trajectory(std::move(rows));
     listing_.pose_file = topic.name.substr(1);
+    listing_.sources.push_back(topic.name);
     return {};
   }
 
@@ -238,7 +280,13 @@ class RecordingLayout {
       const auto message = read_image_message(*bytes, *message_encoding(topic->encoding));
       const auto pixels = message ? pixels_of(*message) : Result<cv::Mat>(message.error());
       if (!pixels || pixels->type() != CV_8UC1) return error(fmt::format("{}: it is no mask", topic->name));
+      const Camera& camera = *listing_.calibration.camera;
+      if (camera.width > 0 && pixels->size() != camera.size()) {
+        return error(fmt::format("{}: the mask has {} x {} pixels, expected {} x {} as the camera",
+                                 topic->name, pixels->cols, pixels->rows, camera.width, camera.height));
+      }
       listing_.mask = *pixels;
+      listing_.sources.push_back(topic->name);
     }
     return {};
   }
@@ -271,7 +319,9 @@ class RecordingLayout {
     const MessageEncoding encoding = *message_encoding(topic.encoding);
     TrajectoryBuilder builder(topic.name);
     std::string child;
+    listing_.sources.push_back(topic.name);
     for (std::size_t i = 0; i < topic.messages.size(); ++i) {
+      if (!(*stamps)[i]) continue;
       const auto bytes = recording_->read(topic.messages[i]);
       if (!bytes) return bytes.error();
       const auto message = read_pose_message(topic.type, *bytes, encoding);
@@ -280,7 +330,7 @@ class RecordingLayout {
         continue;
       }
       if (child.empty()) child = frame_name(message->child);
-      builder.add(i + 1, (*stamps)[i], message->position, message->xyzw);
+      builder.add(i + 1, *(*stamps)[i], message->position, message->xyzw);
     }
     auto trajectory = builder.finish(report_);
     if (!trajectory) return trajectory.error();

@@ -85,6 +85,10 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
   if (!path_exists(folder)) return Error{fmt::format("{}: no such folder", folder.string())};
   if (is_recording(folder)) return read_recording_layout(folder, choice, report);
   std::error_code failure;
+  if (!choice.topics.empty()) {
+    return Error{fmt::format("{}: is no recording of ROS, expected one since topics are named ({})",
+                             folder.string(), in_quotes(choice.topics))};
+  }
   if (!fs::is_directory(folder, failure)) {
     return Error{fmt::format("{}: is a file, expected the folder of a sequence or a recording of ROS{}",
                              folder.string(), advice_for(folder))};
@@ -101,6 +105,7 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
                            "colour", "image_left"}) {
     if (path_exists(folder / name)) return read_tum_layout(folder, choice, report);
   }
+  if (const auto why = why_no_recording(folder)) return Error{folder.string() + ": " + *why};
   return Error{fmt::format(
       "{}: no known layout, expected rgb/ or images/ (TUM RGB-D, ICL-NUIM), mav0/cam0/ (EuRoC), image_0/ or "
       "image_2/ (KITTI odometry), or image_left/ with pose_left.txt (TartanAir)",

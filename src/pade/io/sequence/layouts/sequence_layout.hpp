@@ -39,7 +39,9 @@ struct SequenceListing {
   std::optional<NavigationHealth> navigation;  ///< of computed poses
   std::size_t frames_without_pose = 0;         ///< known when frames and poses have met
   Calibration calibration;
-  std::optional<WorldUp> world_up;  ///< if the layout itself prescribes it
+  std::optional<WorldUp> world_up;   ///< if the layout itself prescribes it
+  std::optional<Pose> T_imu_camera;  ///< of a recording, if its transforms tell it
+  std::vector<std::string> sources;  ///< topics of a recording that were read
 };
 
 /// What a layout needs to know of the options.
