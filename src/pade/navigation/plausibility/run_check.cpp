@@ -106,6 +106,9 @@ std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health
   for (const SensorSummary& sensor : sensors) {
     if (sensor.measurements < 10) continue;
     const double refused = static_cast<double>(sensor.refused) / static_cast<double>(sensor.measurements);
+    const bool is_barometer = sensor.sensor == "barometer";
+    const char* const of_barometer =
+        "check that height_m is in metres and up; leave baro.csv out where it disturbs";
     constexpr double kMostRefused = 0.3;
     constexpr double kInconsistent = 10;  // times what the sigmas allow
     if (refused > kMostRefused) {
@@ -113,14 +116,17 @@ std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health
           fmt::format(
               "{:.0f} % of {} were refused by the filter (mean χ² {:.3g} per component, 1 is consistent)",
               100 * refused, sensor.sensor, sensor.chi_square),
-          sensor.sensor == "barometer"
-              ? "check that height_m is in metres and up; leave baro.csv out where it disturbs"
+          is_barometer
+              ? of_barometer
               : "check clock, axes, units and sigmas of this sensor, and the lever arm (--lever-arm)");
     } else if (sensor.chi_square > kInconsistent) {
-      say(hints, "inconsistent", HintSeverity::warning,
+      // A barometer that is used although it is wrong bends the height.
+      say(hints, "inconsistent", is_barometer ? HintSeverity::error : HintSeverity::warning,
           fmt::format("{} disagree with the filter: mean χ² {:.3g} per component where 1 is consistent",
                       sensor.sensor, sensor.chi_square),
-          "check clock, axes and units of this sensor; sigmas that are too small look like this too");
+          is_barometer
+              ? of_barometer
+              : "check clock, axes and units of this sensor; sigmas that are too small look like this too");
     }
   }
   check_integrity(health, hints);
