@@ -76,14 +76,15 @@ struct Measurement {
                              RangeToGround, RoadMotion, std::shared_ptr<const RawEpoch>,
                              std::shared_ptr<const CameraMotion>>;
 
-  Time time;  ///< on the filter's time scale: the sensor's stamp less its latency
-  Value value;
+  Time time;              ///< on the filter's time scale: the sensor's stamp less its latency
+  Value value;            ///< what was measured
   Innovation innovation;  ///< of its last use by the live filter
 
   Measurement() = default;
-  /// Throws nothing; `latency` in s.
+  /// Of what a sensor has delivered, at a time of the filter's scale.
   Measurement(Time at, Value of) : time(at), value(std::move(of)) {}
 
+  /// Which sensor it is of.
   [[nodiscard]] SensorKind kind() const { return static_cast<SensorKind>(value.index()); }
   /// Null if it is of another sensor, or of an image without a motion.
   template <class Sensor>
@@ -91,6 +92,6 @@ struct Measurement {
     return std::get_if<Sensor>(&value);
   }
 };
-inline constexpr std::size_t sensor_kinds = std::variant_size_v<Measurement::Value>;
+inline constexpr std::size_t sensor_kinds = std::variant_size_v<Measurement::Value>;  ///< how many there are
 
 }  // namespace pade::navigation
