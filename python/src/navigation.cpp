@@ -76,8 +76,9 @@ class Filter {
                     py::arg("seconds_since_position") = h.seconds_since_position,
                     py::arg("yaw_sigma") = h.yaw_sigma, py::arg("imu_refused") = h.imu_refused,
                     py::arg("imu_gaps") = h.imu_gaps, py::arg("too_late") = h.too_late,
-                    py::arg("duplicates") = h.duplicates, py::arg("unusable") = h.unusable,
-                    py::arg("restarts") = h.restarts, py::arg("restarts_when_lost") = h.restarts_when_lost,
+                    py::arg("too_new") = h.too_new, py::arg("duplicates") = h.duplicates,
+                    py::arg("unusable") = h.unusable, py::arg("restarts") = h.restarts,
+                    py::arg("restarts_when_lost") = h.restarts_when_lost,
                     py::arg("times_lost") = h.times_lost, py::arg("velocity_doubted") = h.velocity_doubted);
   }
   [[nodiscard]] Time newest() {
