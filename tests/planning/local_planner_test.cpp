@@ -349,5 +349,26 @@ TEST(LocalPlanner, HopsToTheSidesWhereItGetsNowhere) {
   EXPECT_GT(greatest - least, 0.25);
 }
 
+/// Where hop after hop opens nothing, it looks from farther back: each time farther, as far as is free.
+TEST(LocalPlanner, BacksOffWhereItsHopsOpenNothing) {
+  const Bubble space;
+  LocalPlanner planner = planner_of();
+  MotionState state = at_rest({0, 0, 1.6});
+  double rim = 0;
+  double back = 0;  // the farthest that it has gone back from the rim
+  double aside_there = 0;
+  for (int frame = 0; frame < 600; ++frame) {
+    const LocalPlan& plan = planner.plan(state, {30, 0, 1.6}, space, unseen_window(state.position));
+    state = state_at(plan.motion, state.time + 0.1);
+    rim = std::max(rim, state.position.x());
+    back = std::max(back, rim - state.position.x());
+    if (rim - state.position.x() > 1) aside_there = std::max(aside_there, std::abs(state.velocity.y()));
+    EXPECT_LE((state.position - Vector3d(0, 0, 1.6)).norm() + 0.4, 1.5 + 1e-6) << frame;
+  }
+  EXPECT_GT(rim, 0.7);
+  EXPECT_GT(back, 1.5);
+  EXPECT_GT(aside_there, 0.2);  // the baseline of its look from there
+}
+
 }  // namespace
 }  // namespace pade::planning

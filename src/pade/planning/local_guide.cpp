@@ -16,7 +16,8 @@ constexpr double kPerMetre = 100;    // costs count centimetres
 constexpr std::uint8_t kSeen = 10;   // prices, in tenths
 constexpr std::uint8_t kTight = 13;  // something is near
 constexpr std::uint8_t kUnseen = 15;
-constexpr double kAbout = 3;  // from a goal that is not to be reached, m
+constexpr double kAbout = 3;              // from a goal that is not to be reached, m
+constexpr double kHeightOfArrival = 0.5;  // m
 constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint32_t kFarthest = 4000;  // a way that is longer by 40 m is none
 
@@ -36,6 +37,11 @@ constexpr std::array<Step, 10> kSteps = {{{1, 0, 0, 20},
                                           {0, 0, -1, 60}}};
 
 }  // namespace
+
+bool is_at(const Vector3d& goal, const Vector3d& place, double arrival) {
+  const Vector3d left = goal - place;
+  return left.head<2>().norm() < arrival && std::abs(left.z()) < std::max(arrival, kHeightOfArrival);
+}
 
 Vector3d LocalGuide::centre_of(int x, int y, int z) const {
   return corner_ + Vector3d((x + 0.5) * kCell, (y + 0.5) * kCell, (z + 0.5) * kLevel);
@@ -87,7 +93,8 @@ void LocalGuide::offer(Index cell, std::uint32_t cost) {
 /// The cells that count as the goal; or, where all of them are blocked, those nearest to it. False if none is
 /// passable.
 bool LocalGuide::start_about(const Vector3d& goal, double arrival) {
-  constexpr double kBeyond = 2;  // a metre that will be missing costs so many
+  constexpr double kBeyond = 2;   // a metre that will be missing costs so many
+  constexpr double kClimb = 1.5;  // and one of height that is still to be climbed, as by kSteps
   const double there = std::max(arrival, kCell);
   bool found = false;
   for (const double within : {there, kAbout}) {
@@ -95,9 +102,11 @@ bool LocalGuide::start_about(const Vector3d& goal, double arrival) {
     for (int z = 0; z < size_.z(); ++z) {
       for (int y = 0; y < size_.y(); ++y) {
         for (int x = 0; x < size_.x(); ++x, ++cell) {
-          const double away = (centre_of(x, y, z) - goal).head<2>().norm();
+          const Vector3d left = centre_of(x, y, z) - goal;
+          const double away = left.head<2>().norm();
           if (away > within || price_[cell] == 0) continue;
-          const double cost = away + (kBeyond - 1) * std::max(away - there, 0.0);
+          const double climb = kClimb * std::max(std::abs(left.z()) - kHeightOfArrival, 0.0);
+          const double cost = away + (kBeyond - 1) * std::max(away - there, 0.0) + climb;
           offer(static_cast<Index>(cell), static_cast<std::uint32_t>(std::lround(cost * kPerMetre)));
           found = true;
         }
@@ -108,12 +117,14 @@ bool LocalGuide::start_about(const Vector3d& goal, double arrival) {
   return false;
 }
 
-/// The goal, where the window holds it; else all cells of its sides.
+/// The goal, where the window holds it; else all cells of its sides, and of the side above or below that is
+/// nearer to it.
 void LocalGuide::start_from(const Vector3d& goal, double arrival) {
   const Vector3d at = (goal - corner_).cwiseQuotient(Vector3d(kCell, kCell, kLevel));
   const Vector3i in = at.array().floor().cast<int>();
   least_ = 0;
-  const bool holds = in.x() >= 0 && in.y() >= 0 && in.x() < size_.x() && in.y() < size_.y();
+  const bool holds = in.x() >= 0 && in.y() >= 0 && in.x() < size_.x() && in.y() < size_.y() && in.z() >= -1 &&
+                     in.z() <= size_.z();
   if (!holds || !start_about(goal, arrival)) start_from_sides(goal);
 }
 
@@ -121,12 +132,17 @@ void LocalGuide::start_from_sides(const Vector3d& goal) {
   const auto index = [&](int x, int y, int z) {
     return static_cast<Index>((z * size_.y() + y) * size_.x() + x);
   };
+  constexpr int kNone = -1;
+  const double level = (goal.z() - corner_.z()) / kLevel;
+  const int toward = level < -1 ? 0 : level > size_.z() + 1 ? size_.z() - 1 : kNone;
   const auto for_sides = [&](const auto& visit) {
     for (int z = 0; z < size_.z(); ++z) {
       for (int y = 0; y < size_.y(); ++y) {
         const bool whole = y == 0 || y == size_.y() - 1;
         for (int x = 0; x < size_.x(); x += whole ? 1 : std::max(size_.x() - 1, 1))
           visit(index(x, y, z), (centre_of(x, y, z) - goal).norm());
+        if (z != toward || whole) continue;
+        for (int x = 1; x < size_.x() - 1; ++x) visit(index(x, y, z), (centre_of(x, y, z) - goal).norm());
       }
     }
   };

@@ -10,6 +10,10 @@
 
 namespace pade::planning {
 
+/// Whether a place counts as the goal: horizontally nearer than `arrival` (m), and in height nearer than that
+/// or 0.5 m.
+bool is_at(const Eigen::Vector3d& goal, const Eigen::Vector3d& place, double arrival);
+
 /// Shortest ways (Dijkstra's, over cells of 0.2 m x 0.2 m x 0.4 m) from the window about the vehicle to the
 /// goal. What has not been seen may be flown through at a price; beyond the window the way is straight.
 class LocalGuide {

@@ -44,7 +44,7 @@ struct LocalPlannerOptions {
   double step = 0.1;             ///< between the points at which a path is looked at, s
   double reach = 8;              ///< how far ahead free space is looked for, m
   double slowest = 0.3;          ///< the governor never asks for less, m/s
-  double arrival = 1;            ///< nearer to the goal than this (horizontally) is there, m
+  double arrival = 1;            ///< horizontally nearer to the goal is there, in height than this or 0.5, m
   bool unknown_is_free = false;  ///< fly into what nobody has seen
   bool peering = true;           ///< swing sideways where straight flight leaves the way ahead unknown
 
@@ -57,7 +57,8 @@ struct LocalPlannerOptions {
     field("step", self.step, "between the points at which a path is looked at, s");
     field("reach", self.reach, "how far ahead free space is looked for, m");
     field("slowest", self.slowest, "the governor never asks for less, m/s");
-    field("arrival", self.arrival, "nearer to the goal than this, horizontally, is there, m");
+    field("arrival", self.arrival,
+          "horizontally nearer to the goal is there, in height nearer than this or 0.5 m; m");
     field("unknown_is_free", self.unknown_is_free, "fly into what nobody has seen");
     field("peering", self.peering, "swing sideways where straight flight leaves the way ahead unknown");
   }

@@ -24,6 +24,8 @@ constexpr double kLongestTurn = 4;                // s on the spot
 constexpr double kYield = 0.05;                   // m less than the vehicle, where something is as near
 constexpr double kJoint = 0.05;                   // m; what begins farther off is no rest of a plan
 constexpr double kHopSpeed = 0.4;                 // m/s
+constexpr double kStuckPlace = 1.5;               // m: hops nearer to each other than this are at one place
+constexpr int kHopsBeforeRetreat = 4;             // that have opened nothing
 constexpr double kStanding = 0.05;                // m/s
 constexpr double kCrawl = 0.25;                   // slower motion may have any direction, m/s
 constexpr double kAhead = 1;                      // a second look at the way, this far before the nose, m
@@ -221,8 +223,8 @@ double LocalPlanner::best_heading(const Task& task) const {
   return heading;
 }
 
-bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command, double clear) {
-  foretell(task.from, command, options_.horizon, options_.step, options_.vehicle, candidate_);
+bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command, double clear, double hold) {
+  foretell(task.from, command, hold, options_.step, options_.vehicle, candidate_);
   if (!is_in_bounds(task, candidate_, true) || clear_length(task, candidate_, near_) != kInfinity)
     return false;
   path_.assign(1, candidate_.back().position);
@@ -239,6 +241,10 @@ bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command, doubl
 /// camera that stands, or only turns, sees no depth, and ahead of one that creeps straight on lies its
 /// epipole.
 bool LocalPlanner::hop(const Task& task) {
+  if (is_stuck_here(task)) {
+    retreat_ = Retreat::turning;
+    if (goes_on_retreating(task)) return true;
+  }
   constexpr std::array<std::array<double, 3>, 5> kWays = {
       {{0, 1, 0}, {0, -1, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}}};
   // Away from what it nearly touches, but not against another thing; where that cannot be, a little away.
@@ -246,13 +252,70 @@ bool LocalPlanner::hop(const Task& task) {
   for (const double clear : {plan_.radius, std::min(plan_.radius, near_ + kALittle)}) {
     for (std::size_t i = 0; i < kWays.size(); ++i) {
       const auto& way = kWays[(static_cast<std::size_t>(hops_) + i) % kWays.size()];
-      if (try_hop(task, {kHopSpeed * way[0], kHopSpeed * way[1], kHopSpeed * way[2], 0, 0}, clear)) {
+      if (try_hop(task, {kHopSpeed * way[0], kHopSpeed * way[1], kHopSpeed * way[2], 0, 0}, clear,
+                  options_.horizon)) {
         hops_ += static_cast<int>(i) + 1;
         return true;
       }
     }
   }
   return false;
+}
+
+/// Remembers where it hops. Hops about one place that open nothing say that what blocks the way lies beside
+/// the cone of the camera: it has to be looked at from farther back.
+bool LocalPlanner::is_stuck_here(const Task& task) {
+  if (hops_here_ == 0 || (task.from.position - stuck_at_).norm() > kStuckPlace) {
+    stuck_at_ = task.from.position;
+    hops_here_ = 0;
+  }
+  return ++hops_here_ % kHopsBeforeRetreat == 0;
+}
+
+/// Straight back from the way on, or askew, as far as that is free: each time at one place farther, until a
+/// ball on that way is in view as a whole.
+bool LocalPlanner::back_off(const Task& task) {
+  constexpr double kShare = 1.3;                              // m, for each retreat
+  constexpr double kLongest = 4;                              // m
+  constexpr double kShortest = 0.5;                           // m
+  constexpr double kLess = 0.3;                               // m
+  constexpr std::array kAskew = {0.0, 0.5, -0.5, 1.0, -1.0};  // rad
+  const double most = std::min(kShare * (hops_here_ / kHopsBeforeRetreat), kLongest);
+  for (double way = most; way > kShortest; way -= kLess) {
+    for (const double askew : kAskew) {
+      const MotionCommand command{-kHopSpeed * std::cos(askew), kHopSpeed * std::sin(askew), 0, 0, 0};
+      if (try_hop(task, command, plan_.radius, way / kHopSpeed)) return true;
+    }
+  }
+  return false;
+}
+
+/// The baseline of a look from there.
+bool LocalPlanner::step_aside(const Task& task) {
+  for (const double side : {1.0, -1.0}) {
+    const double left = (hops_ % 2 == 0 ? 1 : -1) * side * kHopSpeed;
+    if (!try_hop(task, {0, left, 0, 0, 0}, plan_.radius, options_.horizon)) continue;
+    ++hops_;
+    return true;
+  }
+  return false;
+}
+
+/// The nose turns to where the way goes on; the vehicle backs off, turns once more to where it then goes on,
+/// and steps aside.
+bool LocalPlanner::goes_on_retreating(const Task& task) {
+  if (retreat_ == Retreat::none) return false;
+  since_ = task.from.time;
+  if (task.from.velocity.norm() > kStanding) {
+    commit(task, true);
+    plan_.kind = PlanKind::recovering;
+    return true;
+  }
+  if (turn(task)) return true;
+  turning_since_ = -1;
+  const bool turned = retreat_ == Retreat::turning;
+  retreat_ = turned && back_off(task) ? Retreat::looking : Retreat::none;
+  return turned ? retreat_ == Retreat::looking : step_aside(task);
 }
 
 /// A hop is flown to its end, as long as it is free.
@@ -319,6 +382,7 @@ const LocalPlan& LocalPlanner::stop(const MotionState& from, const FreeSpace& sp
   commit(place, false);
   since_ = from.time;
   hop_ends_ = standing_since_ = turning_since_ = -1;
+  retreat_ = Retreat::none;
   return plan_;
 }
 
@@ -332,14 +396,14 @@ const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& goa
       std::clamp(governed_speed(sure, options_.vehicle), options_.slowest, options_.vehicle.speed);
   // A little nearer than whoever asks whether it has arrived, and may see it a little farther off.
   constexpr double kWellWithin = 0.8;
-  if ((goal - from.position).head<2>().norm() < kWellWithin * options_.arrival) {
+  if (is_at(goal, from.position, kWellWithin * options_.arrival)) {
     plan_.kind = PlanKind::arrived;
     commit(task, false);
     return plan_;
   }
   guide_.set(window, goal, {options_.vehicle.lowest, options_.vehicle.highest}, options_.arrival);
   const bool stuck = gets_nowhere(task);
-  if (goes_on_hopping(task)) return plan_;
+  if (goes_on_hopping(task) || goes_on_retreating(task)) return plan_;
   plan_.peering = options_.peering && is_blind_ahead(task);
   choose_primitive(task);
   if (plan_.kind != PlanKind::flying) {

@@ -93,8 +93,12 @@ class LocalPlanner {
   void recover(const Task& task);
   bool turn(const Task& task);
   [[nodiscard]] double best_heading(const Task& task) const;
-  bool try_hop(const Task& task, const MotionCommand& command, double clear);
+  bool try_hop(const Task& task, const MotionCommand& command, double clear, double hold);
   bool hop(const Task& task);
+  bool is_stuck_here(const Task& task);
+  bool back_off(const Task& task);
+  bool step_aside(const Task& task);
+  bool goes_on_retreating(const Task& task);
   bool goes_on_hopping(const Task& task);
   [[nodiscard]] bool gets_nowhere(const Task& task);
 
@@ -113,6 +117,11 @@ class LocalPlanner {
   double nearest_ = 0;       // the shortest of all since it last got nowhere, m
   int setbacks_ = 0;         // since then: how often the way turned out to be longer
   double since_ = 0;         // when least_to_go_ was, s
+
+  enum class Retreat { none, turning, looking };  // before and after it backs off
+  Retreat retreat_ = Retreat::none;
+  Eigen::Vector3d stuck_at_ = Eigen::Vector3d::Zero();  // where it last began to hop
+  int hops_here_ = 0;
 };
 
 }  // namespace pade::planning

@@ -126,6 +126,18 @@ TEST(Route, NamesWhatIsWrongWithItsEnds) {
   EXPECT_THAT(message({1, 1.8, 1}, kGoal, UnknownSpace::blocked), HasSubstr("nearer than 0.45 m to unknown"));
   EXPECT_THAT(message({3.6, -1, 1}, kGoal, UnknownSpace::free), HasSubstr("nearer than 0.45 m to occupied"));
   EXPECT_THAT(message({none, 0, 0}, kGoal, UnknownSpace::free), HasSubstr("start"));
+  EXPECT_THAT(message(kStart, {2e6, 0, 1}, UnknownSpace::free), HasSubstr("from the map"));
+}
+
+/// However far away the goal is, a search that is to stop does.
+TEST(Route, StopsWhenItIsTold) {
+  const auto view = MapView::of(room(true));
+  RouteOptions options;
+  options.unknown = UnknownSpace::free;
+  int asked = 0;
+  const auto route = plan_route(*view, kStart, {900, 0, 1}, options, [&] { return ++asked > 5; });
+  EXPECT_FALSE(route);
+  EXPECT_LT(asked, 200);
 }
 
 TEST(Route, IsNotFoundThroughAWallButAroundItWhereUnknownSpaceIsFree) {

@@ -65,13 +65,20 @@ Vector3d point_of(const ob::State* state) {
 /// Asks the map.
 class Corridor : public ob::MotionValidator {
  public:
-  Corridor(const ob::SpaceInformationPtr& space, const MapView& view, double radius, UnknownSpace unknown)
-      : ob::MotionValidator(space), view_(view), radius_(radius), unknown_(unknown) {}
+  Corridor(const ob::SpaceInformationPtr& space, const MapView& view, double radius, UnknownSpace unknown,
+           const std::function<bool()>& stop)
+      : ob::MotionValidator(space), view_(view), radius_(radius), unknown_(unknown), stop_(stop) {}
+  /// False too once it is to stop: one iteration of RRT-Connect may go on for any number of motions.
   bool checkMotion(const ob::State* from, const ob::State* to) const override {
-    return !view_.sweep(std::array{point_of(from), point_of(to)}, radius_, unknown_);
+    return !is_to_stop() && !view_.sweep(std::array{point_of(from), point_of(to)}, radius_, unknown_);
   }
   bool checkMotion(const ob::State* from, const ob::State* to,
                    std::pair<ob::State*, double>& last) const override {
+    if (is_to_stop()) {
+      last.second = 0;
+      if (last.first != nullptr) si_->copyState(last.first, from);
+      return false;
+    }
     const auto hit = view_.sweep(std::array{point_of(from), point_of(to)}, radius_, unknown_);
     if (!hit) return true;
     last.second = hit->share;
@@ -81,8 +88,11 @@ class Corridor : public ob::MotionValidator {
 
  private:
   const MapView& view_;
+  [[nodiscard]] bool is_to_stop() const { return stop_ && stop_(); }
+
   double radius_;
   UnknownSpace unknown_;
+  const std::function<bool()>& stop_;
 };
 
 class Search {
@@ -106,7 +116,7 @@ class Search {
     info_->setStateValidityChecker([&view, radius, unknown = options.unknown](const ob::State* state) {
       return !view.sweep(std::array{point_of(state)}, radius, unknown);
     });
-    info_->setMotionValidator(std::make_shared<Corridor>(info_, view, radius, options.unknown));
+    info_->setMotionValidator(std::make_shared<Corridor>(info_, view, radius, options.unknown, stop_));
     info_->setup();
     problem_ = std::make_shared<ob::ProblemDefinition>(info_);
     problem_->setStartAndGoalStates(state_of(start), state_of(goal));

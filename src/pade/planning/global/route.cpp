@@ -19,8 +19,9 @@ using mapping::Hit;
 using mapping::MapView;
 using mapping::Occupancy;
 
-constexpr double kMargin = 0.002;        // that the search keeps and a smoothed motion may use, m
-constexpr double kLeastRounding = 1e-3;  // less is a stop
+constexpr double kMargin = 0.002;          // that the search keeps and a smoothed motion may use, m
+constexpr double kFarthestFromMap = 1000;  // m: beyond that a place is one of other coordinates
+constexpr double kLeastRounding = 1e-3;    // less is a stop
 
 std::string text_of(const Vector3d& p) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", p.x(), p.y(), p.z());
@@ -34,6 +35,11 @@ Status check_end(const MapView& view, std::string_view name, const Vector3d& poi
   if (options.unknown == mapping::UnknownSpace::blocked && !bounds.contains(point)) {
     return Error{fmt::format("{} {} is outside the map, which reaches from {} to {}", name, text_of(point),
                              text_of(bounds.min()), text_of(bounds.max()))};
+  }
+  if (const double away = bounds.exteriorDistance(point); away > kFarthestFromMap) {
+    return Error{fmt::format(
+        "{} {} is {:.0f} m from the map, which reaches from {} to {}; expected it within {} m", name,
+        text_of(point), away, text_of(bounds.min()), text_of(bounds.max()), kFarthestFromMap)};
   }
   if (const std::optional<Hit> hit =
           view.sweep(std::array{point}, options.radius + kMargin, options.unknown)) {
