@@ -1,6 +1,10 @@
 #include "pade/closed_loop/chain_flight.hpp"
 
 #include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -80,6 +84,46 @@ TEST(ChainFlight, AFrozenCameraStopsItInTime) {
   EXPECT_GT(record.flight.least_clearance, 0.35);
   EXPECT_GT(record.seconds_blind, 2.5);
   EXPECT_LT(record.flight.samples.back().state.velocity.norm(), 0.2);
+}
+
+/// Without satellites it says so, and when it knows too little of its velocity it brakes.
+TEST(ChainFlight, SaysThatItIsWithoutSatellites) {
+  const Place place = columns({});
+  ChainFlightOptions options = quick();
+  options.width = 160;
+  options.time_limit = 1.5;
+  options.fault.kind = Fault::gnss_outage;
+  options.fault.from = 0;
+  options.fault.duration = 1000;
+  options.vehicle.sensors.imu = simulation::SensorGrade::consumer;
+  const ChainRecord record = flown(place, 30, options);
+  EXPECT_GT(record.seconds_alone, 1);
+  ASSERT_FALSE(record.events.empty());
+  EXPECT_NE(record.events.front().find("satellites"), std::string::npos) << record.events.front();
+}
+
+/// What the instruments and the camera may be is checked by name, and what no flight has is refused.
+TEST(ChainFlight, RefusesFaultsAndInstrumentsThatItDoesNotFly) {
+  const auto message = [](const std::function<void(ChainFlightOptions&)>& spoil) {
+    ChainFlightOptions options = quick();
+    spoil(options);
+    const Status status = check(options);
+    return status ? std::string("accepted") : status.error().message;
+  };
+  using Options = ChainFlightOptions;
+  const std::vector<std::pair<std::string, std::function<void(Options&)>>> spoilt = {
+      {"fault.stamp_error", [](Options& o) { o.fault.stamp_error = 0.5; }},
+      {"fault.gust", [](Options& o) { o.fault.gust = std::nan(""); }},
+      {"image.exposure_period", [](Options& o) { o.image.exposure_period = 0; }},
+      {"render.samples", [](Options& o) { o.render.samples = 17; }},
+      {"vehicle.sensors.gnss_rate", [](Options& o) { o.vehicle.sensors.gnss_rate = 0; }},
+      {"vehicle.sensors.imu_rate", [](Options& o) { o.vehicle.sensors.imu_rate = 100; }},
+      {"vehicle.sensors.enabled", [](Options& o) { o.vehicle.sensors.enabled = false; }},
+      {"vehicle.sensors.gnss_latency", [](Options& o) { o.vehicle.sensors.gnss_latency = 60; }},
+      {"exposure_time", [](Options& o) { o.exposure_time = -1; }}};
+  for (const auto& [name, spoil] : spoilt)
+    EXPECT_NE(message(spoil).find(name), std::string::npos) << name << ": " << message(spoil);
+  EXPECT_EQ(message([](Options&) {}), "accepted");
 }
 
 TEST(ChainFlight, TheSameFlightHasTheSameBits) {

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "pade/closed_loop/world_measures.hpp"
+
 #include "columns.hpp"
 
 namespace pade::closed_loop {
@@ -40,6 +42,33 @@ TEST(ExactFlight, GoesAroundColumnsThatStandInItsWay) {
       nearest = std::min(nearest, (s.state.position.head<2>() - p).norm() - column_radius);
     EXPECT_NEAR(s.clearance, std::min(nearest, 2.0), 1e-6);
   }
+}
+
+/// Below the goal is not there: it climbs on the way.
+TEST(ExactFlight, ArrivesInHeightToo) {
+  const Place place = columns({{5, 0.1}});
+  ExactFlightOptions options = quick();
+  options.planner.vehicle.highest = 6;
+  const auto record = fly_exact({place.scene, place.surface, {0, 0, 1.6}, {14, 0, 2.9}}, options);
+  ASSERT_TRUE(record.ok());
+  EXPECT_EQ(record->outcome, Outcome::arrived);
+  EXPECT_LT(std::abs(record->goal_height), 1);
+  EXPECT_LT(record->goal_distance, 1);
+}
+
+/// Wherever a thin thing stands, what is declared free about the start does not reach it.
+TEST(FreeAbout, NeverReachesWhatStandsThere) {
+  for (double azimuth = 0; azimuth < 6.28; azimuth += 0.37) {
+    for (const double away : {0.7, 1.1, 1.6}) {
+      const Place place = columns({{away * std::cos(azimuth), away * std::sin(azimuth)}});
+      const FlightTask task{place.scene, place.surface, {0, 0, 1.6}, {20, 0, 1.6}};
+      const double free = free_about(task, 1.2, 1.5);
+      EXPECT_LE(free, away - column_radius) << azimuth;
+      EXPECT_GT(free, away - column_radius - 0.25) << azimuth;
+    }
+  }
+  const Place open = columns({{2, 0}});
+  EXPECT_EQ(free_about({open.scene, open.surface, {0, 0, 1.6}, {20, 0, 1.6}}, 1.2, 1.5), 1.5);
 }
 
 /// Nearer to the goal than 1 m is there, and may be free where the goal is not.

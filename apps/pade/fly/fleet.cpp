@@ -4,12 +4,12 @@
 #include <cmath>
 #include <iterator>
 #include <memory>
-#include <numbers>
 #include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "pade/closed_loop/world_measures.hpp"
 #include "pade/core/fingerprint.hpp"
 #include "pade/core/version.hpp"
 #include "pade/evaluation/binomial.hpp"
@@ -32,6 +32,7 @@ using closed_loop::FlightTask;
 using closed_loop::FlightWatch;
 using closed_loop::fly_chain;
 using closed_loop::fly_exact;
+using closed_loop::free_about;
 using closed_loop::Outcome;
 using nlohmann::ordered_json;
 using simulation::OpenWorldScene;
@@ -114,25 +115,6 @@ Status check_way(const FlightTask& task, double climb, const planning::VehicleLi
     return Error{
         fmt::format("the climb of {} m to --start: found a surface across it, expected free space", climb)};
   return {};
-}
-
-/// How far about the climb, to the sides and above, nothing stands; at most `most`, m.
-double free_about(const FlightTask& task, double climb, double most) {
-  constexpr double kStep = 0.2;  // m
-  constexpr int kWays = 24;
-  double free = most;
-  for (double below = 0; below <= climb + 1e-9; below += kStep) {
-    const Eigen::Vector3d at = task.start - below * Eigen::Vector3d::UnitZ();
-    for (const double slope : {0.0, 0.8}) {
-      for (int i = 0; i < kWays; ++i) {
-        const double azimuth = 2 * std::numbers::pi * i / kWays;
-        const Eigen::Vector3d way(std::cos(azimuth), std::sin(azimuth), slope);
-        const double met = task.scene.distance(at, way.normalized());
-        if (met < free) free = met;  // NaN where nothing is met
-      }
-    }
-  }
-  return free;
 }
 
 ordered_json record_of(const FleetOptions& options) {

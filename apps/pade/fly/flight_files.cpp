@@ -50,11 +50,11 @@ std::string plans_csv(const FlightRecord& record) {
 
 std::string frames_csv(const ChainRecord& record) {
   constexpr std::array kOutcomes = {"waiting", "mapped", "skipped"};
-  std::string text = "t_s,outcome,views,motion_refined,blind,drift_m,tracking_m\n";
+  std::string text = "t_s,outcome,views,motion_refined,blind,no_satellites,no_velocity,drift_m,tracking_m\n";
   for (const ChainFrame& f : record.frames)
-    text += fmt::format("{:.2f},{},{},{},{},{:.4f},{:.4f}\n", f.time,
+    text += fmt::format("{:.2f},{},{},{},{},{},{},{:.4f},{:.4f}\n", f.time,
                         kOutcomes[static_cast<std::size_t>(f.outcome)], f.views, f.refined ? 1 : 0,
-                        f.blind ? 1 : 0, f.drift, f.tracking);
+                        f.blind ? 1 : 0, f.alone ? 1 : 0, f.unheld ? 1 : 0, f.drift, f.tracking);
   return text;
 }
 
@@ -198,6 +198,7 @@ ordered_json measures_of(const FlightTask& task, const FlightRecord& r, double r
           {"path_excess", arrived ? ordered_json((r.length + rest) / way - 1) : ordered_json()},
           {"goal_velocity_m_s", r.goal_velocity},
           {"goal_distance_m", r.goal_distance},
+          {"goal_height_m", r.goal_height},
           {"least_clearance_m", r.least_clearance},
           {"stops", r.stops},
           {"stands_at_the_end", r.stands},
@@ -229,6 +230,8 @@ ordered_json measures_of(const FlightTask& task, const ChainRecord& r, double ra
   measures["frames_mapped"] = mapped;
   measures["frames_skipped"] = skipped;
   measures["seconds_blind"] = r.seconds_blind;
+  measures["seconds_without_satellites"] = r.seconds_alone;
+  measures["seconds_without_velocity"] = r.seconds_unheld;
   if (r.passer_by_clearance) measures["passer_by_clearance_m"] = *r.passer_by_clearance;
   measures["stamp_correction_s"] = r.stamp_correction;
   measures["largest_drift_m"] = drift;

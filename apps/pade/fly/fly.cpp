@@ -39,7 +39,7 @@ struct FlyArguments {
   std::string out;
   std::string depth = "multi-view";
   std::string fault = "none";
-  double density = 400;
+  std::optional<double> density;
   std::optional<double> way;
   std::optional<double> speed;
   std::optional<int> width;
@@ -71,7 +71,7 @@ Result<std::vector<std::uint64_t>> parse_seeds(const std::string& text) {
   if (!first || !last || *last < *first || *last - *first >= 100000)
     return Error{fmt::format("--seed: found '{}', expected a number or a range such as 1-50", text)};
   std::vector<std::uint64_t> seeds;
-  for (std::uint64_t seed = *first; seed <= *last; ++seed) seeds.push_back(seed);
+  for (std::uint64_t i = 0; i <= *last - *first; ++i) seeds.push_back(*first + i);
   return seeds;
 }
 
@@ -93,7 +93,7 @@ Result<Eigen::Vector3d> parse_point(const std::string& option, const std::string
 
 Result<FlightPlace> place_of(const FlyArguments& arguments) {
   FlightPlace place;
-  place.density = arguments.density;
+  if (arguments.density) place.density = *arguments.density;
   place.way = arguments.way;
   if (arguments.world.empty() == arguments.random.empty())
     return Error{"found both or neither of WORLD and --random, expected one of them"};
@@ -108,6 +108,8 @@ Result<FlightPlace> place_of(const FlyArguments& arguments) {
     return place;
   }
   if (arguments.way) return Error{"--way: found with a world of your own, whose --goal says how far it is"};
+  if (arguments.density)
+    return Error{"--density: found with a world of your own, expected --random, whose worlds have one"};
   place.file = arguments.world;
   place.name = place.file.stem().string();
   const auto start = parse_point("--start", arguments.start);
@@ -153,6 +155,20 @@ Status set_chain(const FlyArguments& arguments, ChainFlightOptions& chain) {
   return {};
 }
 
+/// Options that would change nothing.
+Status check_use(const FlyArguments& arguments, Flier flier) {
+  const auto refuse = [&](const char* option, const char* what) -> Status {
+    return Error{fmt::format("{}: found with --depth {}, which has no {}", option, arguments.depth, what)};
+  };
+  if (flier != Flier::chain && arguments.no_refinement)
+    return refuse("--no-refinement", "motion that images could refine");
+  if (flier != Flier::straight) return {};
+  if (arguments.width) return refuse("--width", "image");
+  if (arguments.unknown_is_free) return refuse("--unknown-is-free", "planner");
+  if (arguments.no_peering) return refuse("--no-peering", "planner");
+  return {};
+}
+
 Result<FleetOptions> fleet_options(const FlyArguments& arguments) {
   FleetOptions options;
   auto place = place_of(arguments);
@@ -172,6 +188,7 @@ Result<FleetOptions> fleet_options(const FlyArguments& arguments) {
     return Error{
         fmt::format("--fault and --config: found with --depth {}, which has no chain that they could change",
                     arguments.depth)};
+  if (const Status s = check_use(arguments, options.flier); !s) return s.error();
   options.exact.planner = options.chain.planner;
   if (arguments.width) options.exact.width = *arguments.width;
   return options;
@@ -256,8 +273,7 @@ void add_options(CLI::App& command, FlyArguments& a) {
       .add_option("--seed", a.seeds,
                   "of the world and the instruments; a range such as 101-150 flies one after the other")
       ->capture_default_str();
-  command.add_option("--density", a.density, "of a random world, obstacles per hectare")
-      ->capture_default_str();
+  command.add_option("--density", a.density, "of a random world, obstacles per hectare (default 400)");
   command.add_option("--way", a.way, "how far away the goal of a random world is, m (default 60)")
       ->check(CLI::Range(5.0, 60.0));
   command.add_option("--start", a.start, "x,y,z where the way begins, m");

@@ -23,12 +23,12 @@ namespace {
 using Eigen::Vector3d;
 using planning::MotionState;
 using simulation::KinematicState;
-constexpr double kLongestStand = 60;  // s
-constexpr double kLookAhead = 0.02;   // s, over which a plan's acceleration is read
-constexpr double kClimbSpeed = 0.6;   // m/s
-constexpr double kAtTheGoal = 5;      // m from the true goal: what single-point GNSS can promise
-constexpr double kLost = 0.4;         // m from the plan: then it is made anew from where the vehicle is
-constexpr double kRecent = 3;         // s of the own track that are known to be free
+constexpr double kLookAhead = 0.02;  // s, over which a plan's acceleration is read
+constexpr double kClimbSpeed = 0.6;  // m/s
+constexpr double kAtTheGoal = 5;     // m from the true goal: what single-point GNSS can promise
+constexpr double kLost = 0.4;        // m from the plan: then it is made anew from where the vehicle is
+constexpr double kRecent = 3;        // s of the own track that are known to be free
+constexpr double kUnheld = 0.5;      // m/s, 1 sigma: with less known of its velocity it cannot even stand
 
 double processor_seconds() {
   timespec now{};
@@ -96,11 +96,13 @@ class ChainLoop {
   bool place(Time stamp, Pose& pose, Matrix6d& covariance);
   [[nodiscard]] std::optional<Vector3d> rate(Time stamp);
   void correct_stamps();
+  void look_at_navigation();
   void anchor(Time stamp, const Pose& T_map_camera);
   [[nodiscard]] MotionState start_of_plan(double effect) const;
   [[nodiscard]] std::shared_ptr<const mapping::MapView> known_about(const Vector3d& place);
   [[nodiscard]] planning::PlaceDoubt doubt();
   std::vector<MotionState> decide(double effect);
+  [[nodiscard]] bool believes_itself_there() const;
   bool fly_until(int tick);
   void look_at_passer_by();
   void say(const std::string& what) { record_.events.push_back(fmt::format("{:.1f} s: {}", now(), what)); }
@@ -132,6 +134,8 @@ class ChainLoop {
   double stamp_correction_ = 0;                // s, of what the camera says
   Vector3d placed_ = Vector3d::Zero();         // by the mapper, the same frame
   double last_depth_ = 0;
+  bool alone_ = false;                           // no satellites: dead reckoning
+  bool unheld_ = false;                          // and too little is known of its velocity
   double offset_ = 0;                            // from the plan, the greatest of late, m
   std::deque<std::pair<double, Vector3d>> own_;  // believed places of the last seconds, map
   cv::Mat frozen_, image_;
@@ -142,7 +146,7 @@ class ChainLoop {
 
 /// Stands until the filter knows where it looks.
 bool ChainLoop::get_ready() {
-  while (vehicle_.truth().time.seconds() < kLongestStand) {
+  while (vehicle_.truth().time.seconds() < ChainFlightOptions::longest_stand) {
     vehicle_.stand();
     if (vehicle_.truth().time.seconds() < options_.stand - 1e-9) continue;
     const auto known = vehicle_.navigator().absolute_pose(vehicle_.truth().time);
@@ -312,13 +316,35 @@ std::shared_ptr<const mapping::MapView> ChainLoop::known_about(const Vector3d& p
   return known->flown(track, options_.planner.vehicle.radius);
 }
 
-/// The whole way that it is beside its plan, for a while; and how sure the motion since the last image is.
+/// Without satellites the velocity drifts, and with it all that is planned and held by it.
+void ChainLoop::look_at_navigation() {
+  const double sigma = vehicle_.velocity_sigma();
+  const navigation::NavigationStatus status = vehicle_.navigator().health().status;
+  const bool alone =
+      status == navigation::NavigationStatus::dead_reckoning || status == navigation::NavigationStatus::lost;
+  if (alone != alone_)
+    say(fmt::format("navigation {} (velocity: {:.2f} m/s, 1 sigma)",
+                    alone ? "has no satellites any more: dead reckoning" : "has satellites again", sigma));
+  alone_ = alone;
+  const bool unheld = alone && sigma > kUnheld;
+  if (unheld != unheld_)
+    say(unheld ? fmt::format("its velocity is known to {:.2f} m/s (1 sigma), too little to fly by: it brakes",
+                             sigma)
+               : "its velocity is known again");
+  unheld_ = unheld;
+}
+
+/// The whole way that it is beside its plan, for a while; and how sure the motion since the last image is,
+/// and without satellites the one until it stands.
 planning::PlaceDoubt ChainLoop::doubt() {
   constexpr double kFades = 0.9;  // a frame
   offset_ = std::max(kFades * offset_, record_.frames.back().tracking);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(since_taken_.topLeftCorner<3, 3>(),
                                                               Eigen::EigenvaluesOnly);
-  return {std::sqrt(std::max(spread.eigenvalues().maxCoeff(), 0.0)), offset_};
+  const planning::VehicleLimits& vehicle = options_.planner.vehicle;
+  const double until_rest = vehicle.latency + vehicle_.believed_velocity().norm() / vehicle.acceleration;
+  const double drift = alone_ ? vehicle_.velocity_sigma() * until_rest : 0;
+  return {std::sqrt(std::max(spread.eigenvalues().maxCoeff(), 0.0) + drift * drift), offset_};
 }
 
 std::vector<MotionState> ChainLoop::decide(double effect) {
@@ -331,11 +357,14 @@ std::vector<MotionState> ChainLoop::decide(double effect) {
     return motion_;
   }
   const MotionState from = start_of_plan(effect);
+  look_at_navigation();
   const planning::PlaceDoubt doubt = this->doubt();
   const auto known = known_about(from.position);
   const planning::MapSpace space(known);
   frame.blind = time - last_depth_ > options_.blind_after;
-  if (frame.blind) {
+  frame.unheld = unheld_;
+  frame.alone = alone_;
+  if (frame.blind || frame.unheld) {
     watch_.add({time, planning::PlanKind::committed, 0, 0, 0});
     return planner_->stop(from, space, doubt).motion;
   }
@@ -357,6 +386,10 @@ void ChainLoop::look_at_passer_by() {
                   vehicle_.truth().velocity.norm()));
 }
 
+bool ChainLoop::believes_itself_there() const {
+  return planning::is_at(T_map_world_ * goal_, vehicle_.believed().translation, options_.planner.arrival);
+}
+
 /// False if it touches something or believes itself at the goal.
 bool ChainLoop::fly_until(int tick) {
   constexpr int kLookEvery = 2;  // steps: 100 Hz
@@ -369,8 +402,7 @@ bool ChainLoop::fly_until(int tick) {
     if (tick_ % kLookEvery != 0) continue;
     if (!watch_.look(level(vehicle_.truth(), now()))) return false;
     look_at_passer_by();
-    const Vector3d left = T_map_world_ * goal_ - vehicle_.believed().translation;
-    if (left.head<2>().norm() < options_.planner.arrival) return false;
+    if (believes_itself_there()) return false;
   }
   return true;
 }
@@ -399,19 +431,26 @@ void ChainLoop::frame() {
 }
 
 Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>& observer) {
+  const int ticks =
+      std::max(1, static_cast<int>(std::lround(1 / (options_.frame_rate * NavigatedVehicle::step))));
+  const double period = ticks * NavigatedVehicle::step;
   const auto finish = [&](Outcome outcome) -> Result<ChainRecord> {
     record_.flight = watch_.finished(outcome, climbed_);
     record_.view = view_;
     record_.climbed = climbed_;
     record_.stamp_correction = stamp_correction_;
     record_.mapper = std::make_shared<ObstacleMapper>(std::move(mapper_));
-    for (const ChainFrame& f : record_.frames) record_.seconds_blind += f.blind ? 1 / options_.frame_rate : 0;
+    for (const ChainFrame& f : record_.frames) {
+      record_.seconds_blind += f.blind ? period : 0;
+      record_.seconds_unheld += f.unheld ? period : 0;
+      record_.seconds_alone += f.alone ? period : 0;
+    }
     return std::move(record_);
   };
   if (!take_off()) return finish(Outcome::never_ready);
-  const int ticks =
-      std::max(1, static_cast<int>(std::lround(1 / (options_.frame_rate * NavigatedVehicle::step))));
-  const double period = ticks * NavigatedVehicle::step;
+  if (std::abs(period * options_.frame_rate - 1) > 1e-9)
+    say(fmt::format("frame_rate {} is flown as {:.2f} Hz: whole steps of {} s", options_.frame_rate,
+                    1 / period, NavigatedVehicle::step));
   const double way = (task_.goal - task_.start).norm();
   while (now() < climbed_ + options_.time_limit) {
     frame();
@@ -423,9 +462,8 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
       return Error{"the flight was interrupted"};
     const auto until = static_cast<int>(tick_) + ticks;
     if (!fly_until(until)) {
-      const Vector3d left = T_map_world_ * goal_ - vehicle_.believed().translation;
-      if (left.head<2>().norm() >= options_.planner.arrival) return finish(Outcome::timed_out);
-      return finish(watch_.goal_distance() < kAtTheGoal ? Outcome::arrived : Outcome::astray);
+      if (!believes_itself_there()) return finish(Outcome::timed_out);
+      return finish(watch_.from_goal().norm() < kAtTheGoal ? Outcome::arrived : Outcome::astray);
     }
     motion_ = std::move(next);
   }
@@ -434,26 +472,9 @@ Result<ChainRecord> ChainLoop::run(const std::function<bool(const ChainMoment&)>
 
 }  // namespace
 
-ObstacleMapperOptions ChainFlightOptions::outdoors() {
-  ObstacleMapperOptions options;
-  options.footing.on = true;
-  return options;
-}
-
 Result<ChainRecord> fly_chain(const FlightTask& task, const ChainFlightOptions& options,
                               const std::function<bool(const ChainMoment&)>& observer) {
-  const std::array<OptionRange, 7> ranges = {{{"climb", options.climb, 0, 100},
-                                              {"frame_rate", options.frame_rate, 1, 100},
-                                              {"time_limit", options.time_limit, above_zero, 1e5},
-                                              {"stand", options.stand, 0, kLongestStand},
-                                              {"known_start", options.known_start, 0, 100},
-                                              {"blind_after", options.blind_after, above_zero, 100},
-                                              {"width", static_cast<double>(options.width), 64, 4096}}};
-  if (const Status s = check_ranges(ranges); !s) return s.error();
-  if (const Status s = check(options.vehicle.model); !s) return s.error();
-  if (const Status s = navigation::check(options.vehicle.navigation); !s) return s.error();
-  if (const auto planner = planning::LocalPlanner::create(options.planner); !planner)
-    return Error{"planner: " + planner.error().message};
+  if (const Status s = check(options); !s) return s.error();
   auto mapper = ObstacleMapper::create(forward_camera(options.width), options.mapper);
   if (!mapper) return mapper.error();
   const Vector3d way = task.goal - task.start;

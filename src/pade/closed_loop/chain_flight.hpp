@@ -23,6 +23,8 @@
 namespace pade::closed_loop {
 
 struct ChainFlightOptions {
+  static constexpr double longest_stand = 60;  ///< s, for `stand` and until it gives up
+
   planning::LocalPlannerOptions planner;
   ObstacleMapperOptions mapper = outdoors();
   NavigatedVehicleOptions vehicle;
@@ -59,6 +61,9 @@ struct ChainFlightOptions {
   static ObstacleMapperOptions outdoors();
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const ChainFlightOptions& options);
+
 /// What became of one image.
 struct ChainFrame {
   double time = 0;  ///< s since take-off
@@ -66,6 +71,8 @@ struct ChainFrame {
   int views = 0;         ///< that its depth was read from, beside the pair
   bool refined = false;  ///< its motion, by the images
   bool blind = false;    ///< nothing new was seen for too long: it brakes
+  bool alone = false;    ///< without satellites: dead reckoning
+  bool unheld = false;   ///< without satellites too little is known of its velocity: it brakes
   Eigen::Vector3d believed =
       Eigen::Vector3d::Zero();  ///< place, in the true world as it was found at take-off, m
   double step = 0;              ///< length of the motion from the frame before, as mapped, m
@@ -92,6 +99,8 @@ struct ChainRecord {
   Pose T_world_map;                              ///< at take-off
   double climbed = 0;                            ///< s, when it was at the height of the start
   double seconds_blind = 0;                      ///< s
+  double seconds_unheld = 0;                     ///< s that it braked since it did not know its velocity
+  double seconds_alone = 0;                      ///< s of dead reckoning, without satellites
   std::optional<double> passer_by_clearance;     ///< least, of the centre, m; if somebody walks by
   double stamp_correction = 0;  ///< s, at the end: what the images have shown of their stamps
 };

@@ -69,6 +69,9 @@ class ExactLoop {
   void see(double time);
   std::vector<MotionState> decide(double time, double effect);
   bool advance(double from, double to);
+  [[nodiscard]] bool is_there() const {
+    return planning::is_at(Vector3d::Zero(), watch_.from_goal(), options_.planner.arrival);
+  }
 
   const FlightTask& task_;
   const ExactFlightOptions& options_;
@@ -107,7 +110,7 @@ bool ExactLoop::advance(double from, double to) {
   const int samples = static_cast<int>(std::lround((to - from) * kSampleRate));
   for (int i = 1; i <= samples; ++i) {
     if (!watch_.look(planning::state_at(motion_, from + i / kSampleRate))) return false;
-    if (watch_.goal_distance() < options_.planner.arrival) return false;
+    if (is_there()) return false;
   }
   return true;
 }
@@ -122,8 +125,7 @@ FlightRecord ExactLoop::run() {
     if (!advance(time, time + period)) break;
     motion_ = std::move(next);
   }
-  const bool there = watch_.goal_distance() < options_.planner.arrival;
-  return watch_.finished(there ? Outcome::arrived : Outcome::timed_out);
+  return watch_.finished(is_there() ? Outcome::arrived : Outcome::timed_out);
 }
 
 }  // namespace

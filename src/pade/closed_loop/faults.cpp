@@ -6,6 +6,9 @@
 #include <numbers>
 #include <utility>
 
+#include "pade/closed_loop/navigated_vehicle.hpp"
+#include "pade/core/option_check.hpp"
+
 namespace pade::closed_loop {
 namespace {
 
@@ -75,6 +78,18 @@ double chance(std::uint64_t seed, int frame) {
 }
 
 }  // namespace
+
+Status check(const FaultOptions& options) {
+  const std::array<OptionRange, 7> ranges = {
+      {{"from", options.from, 0, 1e5},
+       {"duration", options.duration, 0, 1e5},
+       {"stamp_error", options.stamp_error, 0, NavigatedVehicle::remembered},
+       {"gust", options.gust, -50, 50},
+       {"compass_error", options.compass_error, -std::numbers::pi, std::numbers::pi},
+       {"crossing_ahead", options.crossing_ahead, 0, 1e3},
+       {"crossing_at", options.crossing_at, 0, 1e5}}};
+  return check_ranges(ranges);
+}
 
 bool is_dropped(std::uint64_t seed, int frame) {
   // Runs of one, two or three frames begin at random: together one frame in ten.

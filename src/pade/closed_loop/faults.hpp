@@ -66,6 +66,9 @@ struct FaultOptions {
   [[nodiscard]] Seconds seconds_of(double flight) const;
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const FaultOptions& options);
+
 /// Whether a frame never arrives: one in ten, at random, now and then two or three in a row.
 /// @param seed  of the flight. @param frame  counted from take-off
 bool is_dropped(std::uint64_t seed, int frame);

@@ -37,9 +37,9 @@ bool FlightWatch::look(const planning::MotionState& truth) {
   return !collided_;
 }
 
-double FlightWatch::goal_distance() const {
+Eigen::Vector3d FlightWatch::from_goal() const {
   const Eigen::Vector3d& at = record_.samples.empty() ? task_.start : record_.samples.back().state.position;
-  return (at - task_.goal).head<2>().norm();
+  return at - task_.goal;
 }
 
 /// Length and stops; the end of the climb is none.
@@ -59,6 +59,7 @@ void FlightWatch::measure_way(double from) {
 FlightRecord FlightWatch::finished(Outcome outcome, double from) {
   record_.outcome = collided_ ? Outcome::collided : outcome;
   record_.goal_distance = goal_distance();
+  record_.goal_height = from_goal().z();
   record_.least_clearance = kFarthest;
   for (const FlightSample& sample : record_.samples) {
     if (sample.state.time >= from || collided_)

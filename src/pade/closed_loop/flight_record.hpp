@@ -46,6 +46,7 @@ struct FlightRecord {
   double length = 0;           ///< flown on the way, m
   double goal_velocity = 0;    ///< way made good toward the goal over the time of the way, m/s
   double goal_distance = 0;    ///< horizontal, from the true goal at the end, m
+  double goal_height = 0;      ///< above the true goal at the end, m
   double least_clearance = 0;  ///< of the centre from the nearest true surface, m
   int stops = 0;               ///< times that it stood still on the way
   bool stands = false;         ///< at the end
@@ -78,8 +79,10 @@ class FlightWatch {
 
   /// One look, 100 a second. False if the vehicle touches something: the flight has ended.
   bool look(const planning::MotionState& truth);
-  /// Horizontal distance from the goal at the last look, m.
-  [[nodiscard]] double goal_distance() const;
+  /// From the true goal to the last place that was looked at, m.
+  [[nodiscard]] Eigen::Vector3d from_goal() const;
+  /// The horizontal part of that.
+  [[nodiscard]] double goal_distance() const { return from_goal().head<2>().norm(); }
   void add(const FlightPlan& plan) { record_.plans.push_back(plan); }
   /// Ends the flight. A collision that was seen stays one.
   /// @param from  s: when its way began. Clearance (unless it collides before), length, stops and velocity

@@ -1,22 +1,37 @@
 #include "pade/closed_loop/navigated_vehicle.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pade/closed_loop/flight_record.hpp"
+#include "pade/core/option_check.hpp"
 
 namespace pade::closed_loop {
 namespace {
 
 using Eigen::Vector3d;
 using simulation::KinematicState;
-constexpr double kRemembered = 0.2;  // s
 
 }  // namespace
+
+Status check(const NavigatedVehicleOptions& options) {
+  if (const Status s = within("model", simulation::check(options.model)); !s) return s;
+  if (const Status s = within("navigation", navigation::check(options.navigation)); !s) return s;
+  if (const Status s = within("sensors", simulation::check(options.sensors)); !s) return s;
+  if (!options.sensors.enabled)
+    return Error{"option sensors.enabled is false, expected true: navigation needs them"};
+  constexpr double kRate = 1 / NavigatedVehicle::step;
+  const std::array<OptionRange, 2> ranges = {
+      {{"imu_rate", options.sensors.imu_rate, kRate, kRate},
+       {"gnss_latency", options.sensors.gnss_latency, 0, options.navigation.history}}};
+  return within("sensors", check_ranges(ranges));
+}
 
 NavigatedVehicle::NavigatedVehicle(const NavigatedVehicleOptions& options, const FaultOptions& faults,
                                    const Vector3d& start, double yaw, std::uint64_t seed)
     : faults_(faults),
+      gnss_latency_(options.sensors.gnss_latency),
       vehicle_(options.model, start, yaw),
       sensors_(options.sensors, seed),
       gnss_(options.sensors.gnss_rate),
@@ -31,14 +46,16 @@ void NavigatedVehicle::measure(double flight_time) {
   const KinematicState& truth = vehicle_.state();
   const double time = truth.time.seconds();
   past_.push_back(truth);
-  if (past_.size() > static_cast<std::size_t>(kRemembered / step) + 1) past_.pop_front();
+  if (past_.size() > static_cast<std::size_t>(remembered / step) + 1) past_.pop_front();
   navigator_.add(sensors_.imu.sample(truth));
   if (gnss_.is_due(time)) {
     const simulation::GnssEpoch epoch = sensors_.gnss.sample(truth);
-    if (!faults_.is_on(Fault::gnss_outage, flight_time)) {
-      navigator_.add(epoch.fix);
-      navigator_.add(epoch.velocity);
-    }
+    if (!faults_.is_on(Fault::gnss_outage, flight_time)) under_way_.push_back(epoch);
+  }
+  while (!under_way_.empty() && time - under_way_.front().fix.time.seconds() >= gnss_latency_ - 1e-9) {
+    navigator_.add(under_way_.front().fix);
+    navigator_.add(under_way_.front().velocity);
+    under_way_.pop_front();
   }
   if (barometer_.is_due(time)) navigator_.add(sensors_.barometer.sample(truth));
   if (magnetometer_.is_due(time)) {
@@ -62,6 +79,7 @@ void NavigatedVehicle::believe(const Pose& T_map_smooth) {
   const navigation::AbsolutePose known = navigator_.absolute_pose(vehicle_.state().time);
   if (known.answer != navigation::Answer::valid) return;
   T_map_body_ = T_map_smooth * known.T_smooth_body;
+  velocity_sigma_ = std::sqrt(std::max(known.covariance.diagonal().segment<3>(3).maxCoeff(), 0.0));
   map_velocity_ = T_map_body_.rotation * (known.T_world_body.rotation.conjugate() * known.velocity);
 }
 

@@ -26,9 +26,14 @@ struct NavigatedVehicleOptions {
   }
 };
 
+/// Refuses numbers that make no sense, and those of instruments that no flight in a closed loop has
+/// (core/option_check.hpp).
+Status check(const NavigatedVehicleOptions& options);
+
 class NavigatedVehicle {
  public:
-  static constexpr double step = 0.005;  ///< s: of the motion and of the fastest instrument
+  static constexpr double step = 0.005;      ///< s: of the motion and of the fastest instrument
+  static constexpr double remembered = 0.2;  ///< s: how far back the truth can be asked for
 
   /// Stands at a place, which it need not know.
   NavigatedVehicle(const NavigatedVehicleOptions& options, const FaultOptions& faults,
@@ -42,18 +47,22 @@ class NavigatedVehicle {
   void fly(const simulation::Setpoint& setpoint, const Pose& T_map_smooth, double flight_time);
 
   [[nodiscard]] const simulation::KinematicState& truth() const { return vehicle_.state(); }
-  /// The true pose of the body some time ago, at most 0.2 s.
+  /// The true pose of the body some time ago, at most `remembered`.
   [[nodiscard]] simulation::KinematicState truth_before(double seconds) const;
   [[nodiscard]] navigation::Navigator& navigator() { return navigator_; }
   /// Where it believes itself in the map's world, as of the last step; the attitude is the believed one.
   [[nodiscard]] const Pose& believed() const { return T_map_body_; }
   [[nodiscard]] const Eigen::Vector3d& believed_velocity() const { return map_velocity_; }
+  /// How sure it is of its velocity, as of the last step: of the axis that it knows least of, m/s, 1 sigma.
+  [[nodiscard]] double velocity_sigma() const { return velocity_sigma_; }
 
  private:
   void measure(double flight_time);
   void believe(const Pose& T_map_smooth);
 
   FaultOptions faults_;
+  double gnss_latency_;
+  std::deque<simulation::GnssEpoch> under_way_;  // measured, not yet arrived
   simulation::Vehicle vehicle_;
   simulation::SensorSuite sensors_;
   simulation::SampleClock gnss_, barometer_, magnetometer_;
@@ -61,6 +70,7 @@ class NavigatedVehicle {
   std::deque<simulation::KinematicState> past_;
   Pose T_map_body_;
   Eigen::Vector3d map_velocity_ = Eigen::Vector3d::Zero();
+  double velocity_sigma_ = 0;
 };
 
 }  // namespace pade::closed_loop

@@ -92,4 +92,27 @@ WorldMeasures measures_of_world(const FlightTask& task, double radius) {
   return measures;
 }
 
+double free_about(const FlightTask& task, double climb, double most) {
+  constexpr double kGround = 0.2;  // m
+  const double step = std::max(0.1, most / 20);
+  const Vector3d low = task.start - climb * Vector3d::UnitZ();
+  const double fall = task.scene.distance(low, -Vector3d::UnitZ());
+  const double ground =
+      std::isfinite(fall) ? std::max(low.z() - fall + kGround, low.z() - most) : low.z() - most;
+  const double near = 0.5 * std::sqrt(3.0) * step;
+  double free = most;
+  for (double z = ground; z <= task.start.z() + most; z += step) {
+    for (double y = -most; y <= most; y += step) {
+      for (double x = -most; x <= most; x += step) {
+        const double beside = z - std::clamp(z, low.z(), task.start.z());
+        const double away = std::hypot(x, y, beside);
+        if (away - near >= free) continue;
+        const Vector3d at(task.start.x() + x, task.start.y() + y, z);
+        if (task.surface.to(at, near) < near) free = std::max(away - near, 0.0);
+      }
+    }
+  }
+  return free;
+}
+
 }  // namespace pade::closed_loop

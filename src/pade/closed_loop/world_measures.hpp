@@ -21,4 +21,10 @@ struct WorldMeasures {
 /// @param radius  of the vehicle, m
 WorldMeasures measures_of_world(const FlightTask& task, double radius);
 
+/// How far about the climb to the start nothing stands, but for the ground and what is lower than 0.2 m; at
+/// most `most`, m. Never more than is true: it is looked at from points that lie so close that nothing is
+/// between them.
+/// @param climb  m that the vehicle climbs to the start
+double free_about(const FlightTask& task, double climb, double most);
+
 }  // namespace pade::closed_loop

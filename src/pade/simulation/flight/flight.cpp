@@ -1,17 +1,29 @@
 #include "pade/simulation/flight/flight.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
 
+#include "pade/core/option_check.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/sequence/calibration_fields.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/yaml.hpp"
 
 namespace pade::simulation {
+
+Status check(const SensorOptions& options) {
+  const std::array<OptionRange, 5> ranges = {{{"imu_rate", options.imu_rate, 1, 10000},
+                                              {"gnss_rate", options.gnss_rate, 0.1, 1000},
+                                              {"gnss_latency", options.gnss_latency, 0, 10},
+                                              {"baro_rate", options.baro_rate, 0.1, 1000},
+                                              {"mag_rate", options.mag_rate, 0.1, 1000}}};
+  return pade::check_ranges(ranges);
+}
+
 namespace {
 
 using io::Yaml;
@@ -165,20 +177,12 @@ Status check_ranges(const std::string& file, const FlightFile& f) {
                           {"limits.speed", f.limits.speed, kTiny, 1e3},
                           {"limits.acceleration", f.limits.acceleration, kTiny, 1e3},
                           {"limits.tilt_deg", f.limits.tilt_deg, 0, 180},
-                          {"limits.angular_rate_deg_s", f.limits.angular_rate_deg_s, kTiny, 1e5},
-                          {"image.exposure", f.image.exposure, kTiny, 1e6},
-                          {"image.exposure_change", f.image.exposure_change, 0, 0.99},
-                          {"image.exposure_period", f.image.exposure_period, 0.01, 1e5},
-                          {"image.vignetting", f.image.vignetting, 0, 1},
-                          {"image.full_well", f.image.full_well, 0, 1e9},
-                          {"image.read_noise", f.image.read_noise, 0, 1},
-                          {"sensors.imu_rate", f.sensors.imu_rate, 1, 10000},
-                          {"sensors.gnss_rate", f.sensors.gnss_rate, 0.1, 1000},
-                          {"sensors.gnss_latency", f.sensors.gnss_latency, 0, 10},
-                          {"sensors.baro_rate", f.sensors.baro_rate, 0.1, 1000},
-                          {"sensors.mag_rate", f.sensors.mag_rate, 0.1, 1000}};
+                          {"limits.angular_rate_deg_s", f.limits.angular_rate_deg_s, kTiny, 1e5}};
   for (const Range& r : ranges) {
     if (const Status status = in_range(file, r.field, r.value, r.low, r.high); !status) return status;
+  }
+  for (const Status& status : {within("image", check(f.image)), within("sensors", check(f.sensors))}) {
+    if (!status) return Error{fmt::format("{}: {}", file, status.error().message)};
   }
   return {};
 }

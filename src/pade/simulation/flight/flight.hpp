@@ -43,6 +43,9 @@ struct SensorOptions {
   }
 };
 
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const SensorOptions& options);
+
 struct Flight {
   std::string name;
   std::vector<Waypoint> waypoints;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "pade/core/compute/parallel.hpp"
+#include "pade/core/option_check.hpp"
 
 namespace pade::simulation {
 namespace {
@@ -61,6 +62,16 @@ float vignetting(const RayGrid& grid, double loss, int column, int row) {
 }
 
 }  // namespace
+
+Status check(const ImageOptions& options) {
+  const std::array<OptionRange, 6> ranges = {{{"exposure", options.exposure, 1e-9, 1e6},
+                                              {"exposure_change", options.exposure_change, 0, 0.99},
+                                              {"exposure_period", options.exposure_period, 0.01, 1e5},
+                                              {"vignetting", options.vignetting, 0, 1},
+                                              {"full_well", options.full_well, 0, 1e9},
+                                              {"read_noise", options.read_noise, 0, 1}}};
+  return check_ranges(ranges);
+}
 
 cv::Mat form_image(const cv::Mat& radiance, const RayGrid& grid, const ImageOptions& options, double time,
                    std::uint64_t seed, std::uint64_t frame, int threads) {

@@ -6,6 +6,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "pade/core/result.hpp"
 #include "pade/simulation/render/ray_grid.hpp"
 
 namespace pade::simulation {
@@ -34,6 +35,9 @@ struct ImageOptions {
   /// No noise, no vignetting, constant exposure.
   static ImageOptions ideal() { return {false, 1, 0, 6, 0, 0, 0}; }
 };
+
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const ImageOptions& options);
 
 /// CV_8UC1 or CV_8UC3 (BGR) from linear RGB radiance. `time` (s) sets the exposure; the noise of a pixel
 /// depends on `seed`, `frame` and the pixel alone, so that any number of threads gives the same image.

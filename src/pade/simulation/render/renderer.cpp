@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pade/core/compute/parallel.hpp"
+#include "pade/core/option_check.hpp"
 #include "pade/simulation/render/sun_map.hpp"
 #include "pade/simulation/render/truth.hpp"
 #include "pade/simulation/world/texture.hpp"
@@ -310,6 +311,12 @@ void Block::find_shadows(const Eigen::Vector3d& to_sun, const SunMap& sun_map) {
 }
 
 }  // namespace
+
+Status check(const RenderOptions& options) {
+  const std::array<OptionRange, 1> ranges = {
+      {{"samples", static_cast<double>(options.samples), 1, kMostSamples}}};
+  return check_ranges(ranges);
+}
 
 Renderer::Renderer(const Scene& scene) : implementation_(std::make_unique<Implementation>(scene)) {}
 Renderer::Renderer(Renderer&&) noexcept = default;

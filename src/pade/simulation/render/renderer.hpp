@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "pade/core/pose.hpp"
+#include "pade/core/result.hpp"
 #include "pade/simulation/render/ray_grid.hpp"
 #include "pade/simulation/render/scene.hpp"
 
@@ -29,6 +30,9 @@ struct RenderOptions {
   /// One sample per pixel and no ambient occlusion.
   static RenderOptions preview() { return {1, true, false}; }
 };
+
+/// Refuses numbers that make no sense (core/option_check.hpp).
+Status check(const RenderOptions& options);
 
 struct Rendering {
   cv::Mat radiance;  ///< CV_32FC3, RGB, linear; 1 is a white surface in full light; 0 outside the lens
