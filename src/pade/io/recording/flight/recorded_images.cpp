@@ -257,7 +257,8 @@ Result<std::vector<std::optional<Time>>> stamps_of(const Recording& recording, c
     if (!bytes) return bytes.error();
     const auto header = read_header(*bytes, *encoding);
     stamps.emplace_back();
-    if (header && header->stamp.nanoseconds != 0) {
+    // 0 is a time where the recording begins at 0, as simulated flights do.
+    if (header && (header->stamp.nanoseconds != 0 || place.time.nanoseconds == 0)) {
       stamps.back() = header->stamp;
     } else {
       ++silent;
