@@ -146,6 +146,7 @@ TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
       {"autosave: -1\n", "autosave is -1"},
       {"sectors: {own_radius: 10, max_distance: 5}\n", "sectors.own_radius is 10"},
       {"sectors: {max_distance: .nan}\n", "sectors.max_distance"},
+      {"mapper: {map: {voxel: 0.001}}\n", "sectors.max_distance: found 20, expected at most 16.4 m"},
       {"mapper_: {}\n", "mapper_"},
       {"web: {address: 0.0.0.0}\n", "web.token: found none"},
       {"web: {port: 99999}\n", "web.port"},

@@ -36,7 +36,8 @@ class EastwardPoses : public NavigationSource {
     if (!come || age < late + until_next) return {};
     PoseAnswer answer{PoseAnswer::Kind::valid, {}, {}, jumped};
     answer.T_world_body.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
-    answer.T_world_body.translation.x() = kSpeed * seconds_between(zero_, time);
+    answer.T_world_body.translation = start;
+    answer.T_world_body.translation.x() += kSpeed * seconds_between(zero_, time);
     return answer;
   }
 
@@ -44,6 +45,7 @@ class EastwardPoses : public NavigationSource {
   std::atomic<double> late{0};   // s
   std::atomic<double> burst{0};  // s from message to message
   std::atomic<std::size_t> jumped{0};
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();  // to be set before the session runs
   [[nodiscard]] std::optional<Matrix6d> motion_covariance(Time t1, Time t2,
                                                           const Pose& /*camera*/) const override {
     if (!known_motion) return std::nullopt;
@@ -114,6 +116,25 @@ struct Bed {
 void expect_all_counted(const SessionCounts& counts, std::size_t delivered) {
   EXPECT_EQ(counts.frames, delivered);
   EXPECT_EQ(counts.frames, counts.mapped + counts.skipped + counts.dropped);
+}
+
+std::string bytes_of(const mapping::OccupancyMap& map) {
+  return io::bytes_of(io::encode_map(map, io::MapFormat::bt));
+}
+
+/// The map that a recording makes.
+std::string replayed(const std::filesystem::path& file, const ObstacleMapperOptions& options) {
+  const auto sequence = io::Sequence::open(file);
+  EXPECT_TRUE(sequence) << sequence.error().message;
+  if (!sequence) return {};
+  auto mapper = ObstacleMapper::create(sequence->camera(), options, sequence->mask());
+  EXPECT_TRUE(mapper);
+  for (std::size_t i = 0; i < sequence->size(); ++i) {
+    const auto frame = sequence->frame(i);
+    EXPECT_TRUE(frame) << frame.error().message;
+    if (frame) mapper->add(frame->image, frame->time, frame->T_world_camera, frame->motion_covariance);
+  }
+  return bytes_of(mapper->map());
 }
 
 TEST(Session, MapsTheWallAhead) {
@@ -222,6 +243,41 @@ TEST(Session, AJumpOfThePosesBeginsTheMapAnew) {
   EXPECT_GT(counts.mapped_anew, 0U);
 }
 
+/// A map ends 32768 voxels from its origin; the flight does not.
+TEST(Session, FarFromTheOriginOfThePosesTheMapHasOneOfItsOwn) {
+  const test::TemporaryFolder folder;
+  const WallCamera camera(10);
+  auto recorder = SessionRecorder::create(folder / "flight.mcap", camera.camera(), camera.mask());
+  ASSERT_TRUE(recorder) << recorder.error().message;
+  Bed bed(10, recorder->get());
+  bed.poses.start = {0, -40'000, 120};
+  const auto& counts = bed.run(1.2, [](double) {});
+  EXPECT_EQ(counts.restarts, 0U);
+  EXPECT_EQ(counts.outside, 0U);
+  EXPECT_NEAR(bed.session->origin().y(), -40'000, 1);
+  EXPECT_NEAR(bed.session->origin().z(), 120, 1);
+  EXPECT_GT(bed.session->map().counts().occupied, 50U);
+  ASSERT_FALSE(bed.gatherer.ages.empty());
+  const LiveUpdate& last = bed.gatherer.last;
+  EXPECT_NEAR(obstacle_distances(*last.view, last.T_world_body, SectorOptions{})[0], 285, 50);
+  ASSERT_TRUE((*recorder)->finish());
+  EXPECT_EQ(replayed(folder / "flight.mcap", bed.mapper), bytes_of(bed.session->map()));
+}
+
+TEST(Session, NearTheBorderOfAMapAnotherIsBegun) {
+  Bed bed(10);
+  bed.poses.start = {32768 * bed.mapper.map.voxel - 200 - 0.8 * kSpeed, 5, 0};
+  const auto& counts = bed.run(1.6, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_EQ(counts.restarts, 1U);
+  EXPECT_EQ(counts.borders, 1U);
+  EXPECT_EQ(bed.gatherer.begun_anew, 1);
+  EXPECT_LT(counts.mapped_anew, counts.mapped);
+  EXPECT_NEAR(bed.session->origin().x(), bed.poses.start.x() + 0.8 * kSpeed, 0.3);
+  EXPECT_NEAR(bed.session->origin().y(), 5, 1e-6);
+  EXPECT_LT(bed.gatherer.last.T_world_body.translation.norm(), 2);
+}
+
 /// An autopilot that starts anew on the ground and then has no pose leaves the flight's map as it is.
 TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
   Bed bed(10);
@@ -231,25 +287,6 @@ TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
   });
   EXPECT_EQ(counts.restarts, 0U);
   EXPECT_FALSE(bed.session->map().bounds().isEmpty());
-}
-
-std::string bytes_of(const mapping::OccupancyMap& map) {
-  return io::bytes_of(io::encode_map(map, io::MapFormat::bt));
-}
-
-/// The map that a recording makes.
-std::string replayed(const std::filesystem::path& file, const ObstacleMapperOptions& options) {
-  const auto sequence = io::Sequence::open(file);
-  EXPECT_TRUE(sequence) << sequence.error().message;
-  if (!sequence) return {};
-  auto mapper = ObstacleMapper::create(sequence->camera(), options, sequence->mask());
-  EXPECT_TRUE(mapper);
-  for (std::size_t i = 0; i < sequence->size(); ++i) {
-    const auto frame = sequence->frame(i);
-    EXPECT_TRUE(frame) << frame.error().message;
-    if (frame) mapper->add(frame->image, frame->time, frame->T_world_camera, frame->motion_covariance);
-  }
-  return bytes_of(mapper->map());
 }
 
 TEST(SessionRecording, MakesTheSameMapAgain) {

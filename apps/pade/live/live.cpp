@@ -220,15 +220,34 @@ class Web {
   std::unique_ptr<live::WebServer> server_;  // last: it uses the others
 };
 
-/// A line each five seconds, for the log.
+std::string origin_text(const live::Session& session) {
+  const Eigen::Vector3d& origin = session.origin();
+  return fmt::format("the map's 0 0 0 is {:.2f} m east, {:.2f} m north, {:.2f} m up of that of the poses",
+                     origin.x(), origin.y(), origin.z());
+}
+
+std::string outside_text(const live::SessionCounts& counts) {
+  return fmt::format("{} points lay beyond what a map can hold (mapper.map.voxel)", counts.outside);
+}
+
+/// A line each five seconds, for the log, and what happens between them.
 class LiveLog {
  public:
-  void maybe(const live::Progress& progress, const live::LinkReport& link, const std::string& stamps,
+  void maybe(const live::Progress& progress, const live::LinkReport& link, const live::Session& session,
              const Web* web) {
     constexpr double kPause = 5;  // s
     const Time now = live::now_of_ours();
+    const live::SessionCounts& counts = session.counts();
+    if (std::exchange(restarts_, counts.restarts) != counts.restarts) {
+      const bool border = std::exchange(borders_, counts.borders) != counts.borders;
+      say(fmt::format(
+          "the map is begun anew, since {}\n",
+          border ? "the vehicle has come near the border of what a map can hold" : "the poses have jumped"));
+    }
+    if (std::exchange(origin_, session.origin()) != session.origin()) say(origin_text(session) + "\n");
     if (seconds_between(last_, now) < kPause) return;
     last_ = now;
+    const std::string stamps = live::stamp_text(session.stamp_offset());
     const auto age = [&](std::int64_t then) {
       return then == 0 ? std::string("none")
                        : fmt::format("{:.2f} s old", 1e-9 * static_cast<double>(now.nanoseconds - then));
@@ -240,11 +259,14 @@ class LiveLog {
       say("the autopilot does not know OBSTACLE_DISTANCE_3D: it gets OBSTACLE_DISTANCE (link.obstacles: "
           "level)\n");
     if (!stamps.empty()) say(stamps + "\n");
+    if (counts.outside > 0) say(outside_text(counts) + "\n");
     if (web != nullptr) say(web->text() + "\n");
   }
 
  private:
   Time last_ = live::now_of_ours();
+  std::size_t restarts_ = 0, borders_ = 0;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 
 /// Tells systemd that all threads get on, each second. Called by the mapper's thread, so that one that is
@@ -271,8 +293,13 @@ std::string summary(const live::SessionCounts& counts, const live::LinkReport& l
       "{} frames: {} mapped, {} skipped, {} dropped for newer ones; {} sectors sent, {} too old to be sent\n",
       counts.frames, counts.mapped, counts.skipped, counts.dropped, link.sectors_sent, link.sectors_stale);
   for (const auto& [reason, count] : counts.reasons) text += fmt::format("  skipped {}: {}\n", count, reason);
-  if (counts.restarts > 0)
-    text += fmt::format("  {} maps begun anew because the poses jumped\n", counts.restarts);
+  if (const std::size_t jumps = counts.restarts - counts.borders; jumps > 0)
+    text += fmt::format("  {} maps begun anew because the poses jumped\n", jumps);
+  if (counts.borders > 0)
+    text +=
+        fmt::format("  {} maps begun anew because the vehicle came near the border of what one can hold\n",
+                    counts.borders);
+  if (counts.outside > 0) text += fmt::format("  {}\n", outside_text(counts));
   text += fmt::format("link: {} packets, {} bad, {} gaps; {} packets of ours not taken\n", link.in.packets,
                       link.in.bad, link.in.gaps, link.unsent);
   return text;
@@ -282,7 +309,7 @@ Status save_map(const live::Session& session, const live::SaverReport& meanwhile
   std::string text;
   if (!meanwhile.earlier.empty()) text += fmt::format("{}: of an earlier session\n", meanwhile.earlier);
   for (const std::string& finished : meanwhile.finished)
-    text += fmt::format("{}: until the poses jumped\n", finished);
+    text += fmt::format("{}: until a map was begun anew\n", finished);
   if (meanwhile.failed > 0) {
     say(fmt::format("{} times the map could not be saved meanwhile: {}\n", meanwhile.failed,
                     meanwhile.error));
@@ -290,11 +317,12 @@ Status save_map(const live::Session& session, const live::SaverReport& meanwhile
   const live::SessionCounts& counts = session.counts();
   if (counts.mapped == 0) return Error{"nothing was mapped, so no map is saved"};
   if (!file.empty() && counts.mapped_anew == 0) {
-    text += fmt::format("nothing was mapped since the poses jumped, so {} is not written\n", file);
+    text += fmt::format("nothing was mapped since the map was begun anew, so {} is not written\n", file);
   } else if (!file.empty()) {
     if (Status saved = io::write_map(session.map(), file, io::Overwrite::replace); !saved) return saved;
     const mapping::OccupancyMap::Counts voxels = session.map().counts();
     text += fmt::format("{}: {} voxels occupied, {} free\n", file, voxels.occupied, voxels.free);
+    if (!session.origin().isZero()) text += origin_text(session) + "\n";
   }
   (void)std::fputs(text.c_str(), stdout);
   return {};
@@ -357,7 +385,7 @@ Status run_live(const LiveArguments& arguments) {
     const Time start = live::now_of_ours();
     session->run([&] {
       const std::string stamps = live::stamp_text(session->stamp_offset());
-      log.maybe(progress, parts->link->report(), stamps, web.get());
+      log.maybe(progress, parts->link->report(), *session, web.get());
       if (web) web->maybe(session->counts(), stamps);
       pulse.maybe(*parts->link);
       const bool over =

@@ -9,6 +9,7 @@
 #include "pade/io/text.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/camera/v4l2_source.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
 namespace pade::live {
 namespace {
@@ -53,7 +54,14 @@ Status check(const LiveOptions& options) {
         "navigator.filter.raw_gnss, camera: found one that is on, expected both off: an autopilot sends "
         "neither raw "
         "GNSS nor the motions of a camera"};
-  return within("mapper", check(options.mapper));
+  if (const Status status = within("mapper", check(options.mapper)); !status) return status;
+  const double reach = options.mapper.map.voxel * mapping::kTreeCentre / 2;
+  if (options.sectors.max_distance > reach)
+    return Error{
+        fmt::format("sectors.max_distance: found {}, expected at most {:.3g} m: a map of voxels of {} m "
+                    "reaches no farther",
+                    options.sectors.max_distance, reach, options.mapper.map.voxel)};
+  return {};
 }
 
 Status check_place(const std::string& field, const std::string& file) {

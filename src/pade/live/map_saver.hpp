@@ -21,7 +21,7 @@ struct SaverReport {
   std::size_t saved = 0;              ///< times that a map was written
   std::size_t failed = 0;             ///< times that it could not be
   std::string error;                  ///< of the last failure
-  std::vector<std::string> finished;  ///< files of maps that ended because the poses jumped
+  std::vector<std::string> finished;  ///< files of maps that ended because another was begun
   std::string earlier;                ///< where the map of an earlier session went; empty: there was none
 };
 
