@@ -1,6 +1,7 @@
 // The map on disk while a session goes on: whole at any moment, whatever ends the program.
 #include "pade/live/map_saver.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -20,7 +21,10 @@
 
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/text.hpp"
+#include "pade/live/recordings/session_recorder.hpp"
 #include "pade/live/service.hpp"
+
+#include "support/synced_files.hpp"
 
 namespace pade::live {
 namespace {
@@ -174,6 +178,48 @@ TEST_F(MapOnDisk, IsWholeAfterFiftyKills) {
     }
   }
   EXPECT_EQ(there, 50);
+}
+
+/// Pulling the battery takes what the system had not written yet: of a file the bytes, so that it is there
+/// and empty, of a folder the names.
+TEST_F(MapOnDisk, IsOnTheDiskItselfAndSoIsTheRecording) {
+  using testing::Contains;
+  test::SyncedFiles& disk = test::SyncedFiles::all();
+  const auto expect_whole = [&](const std::string& name, const std::string& before) {
+    const auto synced = disk.take();
+    const auto file = std::find_if(synced.begin(), synced.end(), [&](const test::Synced& s) {
+      return s.path.find(before) != std::string::npos && s.bytes == content(name).size();
+    });
+    ASSERT_NE(file, synced.end()) << name << ": its bytes";
+    EXPECT_TRUE(std::any_of(file, synced.end(),
+                            [&](const test::Synced& s) {
+                              return s.path == folder_.string() &&
+                                     std::count(s.names.begin(), s.names.end(), name) == 1;
+                            }))
+        << name << ": its name";
+  };
+  disk.take();
+  const auto view = walls(2);
+  MapSaver saver(file("map.bt"), 0.02);
+  saver.take(update_with(view));
+  ASSERT_TRUE(within_seconds(5, [&] { return saver.report().saved > 0; }));
+  expect_whole("map.bt", ".map.bt.partial");
+  saver.begin_anew();
+  ASSERT_TRUE(within_seconds(5, [&] { return saver.report().finished.size() == 1; }));
+  expect_whole("map-1.bt", ".map-1.bt.partial");
+  saver.finish();
+
+  OccupancyMap map = std::move(OccupancyMap::create()).value();
+  ASSERT_TRUE(write_lasting_map(map, file("end.ot")));
+  expect_whole("end.ot", ".end.ot.partial");
+
+  Camera camera;
+  camera.width = camera.height = 8;
+  auto recorder = SessionRecorder::create(file("flight.mcap"), camera, {});
+  ASSERT_TRUE(recorder) << recorder.error().message;
+  (*recorder)->take({cv::Mat::zeros(8, 8, CV_8UC1), Time{1'000'000'000}, Pose{}, Matrix6d::Zero()});
+  ASSERT_TRUE((*recorder)->finish());
+  expect_whole("flight.mcap", "flight.mcap.part");
 }
 
 /// A socket as systemd has one.

@@ -15,7 +15,6 @@
 #include <fmt/format.h>
 
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/formats/map_files.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/config.hpp"
 #include "pade/live/link/filtered_poses.hpp"
@@ -319,7 +318,7 @@ Status save_map(const live::Session& session, const live::SaverReport& meanwhile
   if (!file.empty() && counts.mapped_anew == 0) {
     text += fmt::format("nothing was mapped since the map was begun anew, so {} is not written\n", file);
   } else if (!file.empty()) {
-    if (Status saved = io::write_map(session.map(), file, io::Overwrite::replace); !saved) return saved;
+    if (Status saved = live::write_lasting_map(session.map(), file); !saved) return saved;
     const mapping::OccupancyMap::Counts voxels = session.map().counts();
     text += fmt::format("{}: {} voxels occupied, {} free\n", file, voxels.occupied, voxels.free);
     if (!session.origin().isZero()) text += origin_text(session) + "\n";

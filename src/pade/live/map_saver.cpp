@@ -7,10 +7,23 @@
 #include <fmt/format.h>
 
 #include "pade/io/formats/map_files.hpp"
+#include "pade/io/lasting_output.hpp"
 
 namespace pade::live {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+io::MapFormat format_of(const fs::path& file) {
+  return file.extension() == ".ot" ? io::MapFormat::ot : io::MapFormat::bt;
+}
+
+}  // namespace
+
+Status write_lasting_map(const mapping::OccupancyMap& map, const fs::path& file) {
+  return io::write_lasting_file(file, io::encode_map(map, format_of(file)));
+}
 
 MapSaver::MapSaver(fs::path file, double every)
     : file_(std::move(file)), every_(every), thread_([this] { work(); }) {}
@@ -95,7 +108,7 @@ void MapSaver::keep_earlier() {
 void MapSaver::save(const View& view, bool is_finished) {
   if (!is_finished) keep_earlier();
   const fs::path file = is_finished ? free_name() : file_;
-  const Status status = io::write_map(*view, file, io::Overwrite::replace);
+  const Status status = io::write_lasting_file(file, io::encode_map(*view, format_of(file)));
   const std::lock_guard lock(mutex_);
   if (!status) {
     ++report_.failed;

@@ -11,7 +11,9 @@
 #include <thread>
 #include <vector>
 
+#include "pade/core/result.hpp"
 #include "pade/live/interfaces.hpp"
+#include "pade/mapping/occupancy_map.hpp"
 #include "pade/mapping/query/map_view.hpp"
 
 namespace pade::live {
@@ -25,9 +27,14 @@ struct SaverReport {
   std::string earlier;                ///< where the map of an earlier session went; empty: there was none
 };
 
-/// Writes the newest view of the map now and then, in a thread of its own: whoever offers one never waits. A
-/// file is replaced as a whole or not at all, and only by the map that it already holds: those of earlier
-/// sessions and of before a jump of the poses stay, under the first free number (map-1.bt, map-2.bt, ...).
+/// Replaces a file by a map: whole or not at all, and on the disk before it returns.
+/// @param file  .bt or .ot
+Status write_lasting_map(const mapping::OccupancyMap& map, const std::filesystem::path& file);
+
+/// Writes the newest view of the map now and then, on the disk itself, in a thread of its own: whoever offers
+/// one never waits. A file is replaced as a whole or not at all, and only by the map that it already holds:
+/// those of earlier sessions and of before a jump of the poses stay, under the first free number (map-1.bt,
+/// map-2.bt, ...).
 class MapSaver : public Sink {
  public:
   /// @param file   .bt or .ot
