@@ -137,6 +137,41 @@ TEST_F(MapOnDisk, OfAnEarlierSessionIsKeptToo) {
   EXPECT_FALSE(fs::exists(file("map-2.bt")));
 }
 
+/// Neither a session in which nothing was seen nor one that wrote only at its end costs what was there.
+TEST_F(MapOnDisk, OfAnEarlierSessionIsNotWrittenOverByAnEmptyOne) {
+  std::ofstream(file("map.bt")) << "earlier";
+  const OccupancyMap empty = std::move(OccupancyMap::create()).value();
+  {
+    MapSaver saver(file("map.bt"), 0.01);
+    saver.take(update_with(MapView::of(empty)));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    const SaverReport report = saver.finish();
+    EXPECT_FALSE(report.any);
+    EXPECT_EQ(report.saved, 0U);
+    EXPECT_EQ(content("map.bt"), "earlier");
+  }
+  MapSaver saver(file("map.bt"), 0);
+  EXPECT_FALSE(saver.finish().any);
+  ASSERT_TRUE(saver.write_last(empty));  // whatever it holds, and though no view ever came
+  EXPECT_EQ(content("map-1.bt"), "earlier");
+  EXPECT_EQ(saver.report().earlier, file("map-1.bt").string());
+  ASSERT_TRUE(saver.write_last(empty));
+  EXPECT_FALSE(fs::exists(file("map-2.bt"))) << "its own is written over";
+}
+
+/// What cannot be moved stays.
+TEST_F(MapOnDisk, OfAnEarlierSessionThatCannotBeMovedStays) {
+  // Longer than a name may be once it has its number.
+  const std::string name = std::string(252, 'm') + ".bt";
+  std::ofstream(file(name)) << "earlier";
+  MapSaver saver(file(name), 0);
+  saver.finish();
+  const Status status = saver.write_last(std::move(OccupancyMap::create()).value());
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, testing::HasSubstr("cannot be moved"));
+  EXPECT_EQ(content(name), "earlier");
+}
+
 TEST_F(MapOnDisk, ThatCannotBeWrittenIsCountedAndNamed) {
   MapSaver saver(folder_ / "nowhere" / "map.bt", 0.02);
   saver.take(update_with(walls(1)));
@@ -210,7 +245,9 @@ TEST_F(MapOnDisk, IsOnTheDiskItselfAndSoIsTheRecording) {
   saver.finish();
 
   OccupancyMap map = std::move(OccupancyMap::create()).value();
-  ASSERT_TRUE(write_lasting_map(map, file("end.ot")));
+  MapSaver last(file("end.ot"), 0);
+  last.finish();
+  ASSERT_TRUE(last.write_last(map));
   expect_whole("end.ot", ".end.ot.partial");
 
   Camera camera;

@@ -304,9 +304,10 @@ std::string summary(const live::SessionCounts& counts, const live::LinkReport& l
   return text;
 }
 
-Status save_map(const live::Session& session, const live::SaverReport& meanwhile, const std::string& file) {
-  std::string text;
-  if (!meanwhile.earlier.empty()) text += fmt::format("{}: of an earlier session\n", meanwhile.earlier);
+/// @param text  gets what is to be said of it
+Status save_map(const live::Session& session, live::MapSaver& saver, const std::string& file,
+                std::string& text) {
+  const live::SaverReport meanwhile = saver.finish();
   for (const std::string& finished : meanwhile.finished)
     text += fmt::format("{}: until a map was begun anew\n", finished);
   if (meanwhile.failed > 0) {
@@ -314,16 +315,18 @@ Status save_map(const live::Session& session, const live::SaverReport& meanwhile
                     meanwhile.error));
   }
   const live::SessionCounts& counts = session.counts();
-  if (counts.mapped == 0) return Error{"nothing was mapped, so no map is saved"};
-  if (!file.empty() && counts.mapped_anew == 0) {
+  if (counts.mapped > 0 && counts.restarts > 0 && !meanwhile.any) {
     text += fmt::format("nothing was mapped since the map was begun anew, so {} is not written\n", file);
-  } else if (!file.empty()) {
-    if (Status saved = live::write_lasting_map(session.map(), file); !saved) return saved;
+  } else if (meanwhile.any) {
+    if (Status saved = saver.write_last(session.map()); !saved) return saved;
+    const std::string earlier = saver.report().earlier;
+    if (!earlier.empty()) text += fmt::format("{}: of an earlier session\n", earlier);
     const mapping::OccupancyMap::Counts voxels = session.map().counts();
     text += fmt::format("{}: {} voxels occupied, {} free\n", file, voxels.occupied, voxels.free);
     if (!session.origin().isZero()) text += origin_text(session) + "\n";
   }
-  (void)std::fputs(text.c_str(), stdout);
+  if (!meanwhile.any && counts.restarts == 0)
+    return Error{fmt::format("nothing was mapped, so {} is not written", file)};
   return {};
 }
 
@@ -394,10 +397,9 @@ Status run_live(const LiveArguments& arguments) {
   }
   service.stopping();
   parts->link->end();
-  live::SaverReport meanwhile;
-  if (saver) meanwhile = saver->finish();
-  const Status saved = save_map(*session, meanwhile, options.map);
-  std::string text = summary(session->counts(), parts->link->report());
+  std::string text;
+  const Status saved = saver ? save_map(*session, *saver, options.map, text) : Status();
+  text += summary(session->counts(), parts->link->report());
   if (const std::string stamps = live::stamp_text(session->stamp_offset()); !stamps.empty())
     text += stamps + "\n";
   if (web) text += web->text() + "\n";

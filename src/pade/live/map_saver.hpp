@@ -25,11 +25,8 @@ struct SaverReport {
   std::string error;                  ///< of the last failure
   std::vector<std::string> finished;  ///< files of maps that ended because another was begun
   std::string earlier;                ///< where the map of an earlier session went; empty: there was none
+  bool any = false;                   ///< finish(): something is known of the map as it is
 };
-
-/// Replaces a file by a map: whole or not at all, and on the disk before it returns.
-/// @param file  .bt or .ot
-Status write_lasting_map(const mapping::OccupancyMap& map, const std::filesystem::path& file);
 
 /// Writes the newest view of the map now and then, on the disk itself, in a thread of its own: whoever offers
 /// one never waits. A file is replaced as a whole or not at all, and only by the map that it already holds:
@@ -43,9 +40,13 @@ class MapSaver : public Sink {
   MapSaver(std::filesystem::path file, double every);
   ~MapSaver() override;
   /// Ends what is being written and maps that have ended, then the thread. The newest view is left to whoever
-  /// saves the map at the end.
+  /// saves the map at the end: by write_last().
   SaverReport finish();
+  /// Writes the map as it is at the end, after finish(). Errors: it cannot be written, or the map of an
+  /// earlier session cannot be moved out of its way.
+  Status write_last(const mapping::OccupancyMap& map);
 
+  /// Views in which nothing is known are none.
   void take(const LiveUpdate& update) override;
   /// The map so far goes to a file of its own.
   void begin_anew() override;
@@ -56,7 +57,7 @@ class MapSaver : public Sink {
   void work();
   void save(const View& view, bool is_finished);
   [[nodiscard]] std::filesystem::path free_name() const;
-  void keep_earlier();
+  Status keep_earlier();
 
   std::filesystem::path file_;
   double every_;
@@ -65,7 +66,6 @@ class MapSaver : public Sink {
   View newest_;              // since the last save
   View last_;                // of the map as it is
   std::vector<View> ended_;  // maps that ended, to be saved
-  bool any_ = false;         // a view was offered
   bool kept_earlier_ = false;
   bool over_ = false;
   SaverReport report_;
