@@ -68,13 +68,13 @@ class LiveCommand : public testing::Test {
     const auto text = io::read_file(folder_ / "said");
     return text ? *text : std::string();
   }
-  /// Starts the program, its output in the file "said".
-  [[nodiscard]] pid_t start(const fs::path& file) const {
+  /// Starts the program, its output in the file "said", or where it is told.
+  [[nodiscard]] pid_t start(const fs::path& file, int said = -1) const {
     const std::string out = (folder_ / "said").string();
     const std::string yaml = file.string();
     const pid_t child = ::fork();
     if (child != 0) return child;
-    const int said = ::open(out.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0600);
+    if (said < 0) said = ::open(out.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0600);
     ::dup2(said, STDOUT_FILENO);
     ::dup2(said, STDERR_FILENO);
     ::execl(PADE_PROGRAM, "pade", "live", yaml.c_str(), nullptr);
@@ -108,6 +108,44 @@ TEST_F(LiveCommand, SavesItsMapOnSigtermWithinTwoSecondsAndOutlivesItsTerminal) 
   EXPECT_GT(map->counts().occupied, 50U);
   EXPECT_THAT(autopilot.texts(), Contains(HasSubstr("obstacle mapping active")));
   EXPECT_THAT(autopilot.texts().back(), HasSubstr("has ended"));
+}
+
+/// `pade live vehicle.yaml | head`, and a log that nobody reads any more: both would end or hold up the
+/// flight.
+TEST_F(LiveCommand, OutlivesWhoeverReadsItsLog) {
+  for (const bool closed : {true, false}) {
+    record(15);
+    int log[2];
+    ASSERT_EQ(::pipe2(log, O_CLOEXEC), 0);
+    if (closed) {
+      ::close(log[0]);
+    } else {  // full
+      ASSERT_EQ(::fcntl(log[1], F_SETFL, O_NONBLOCK), 0);
+      while (::write(log[1], "x", 1) == 1) {
+      }
+      ASSERT_EQ(::fcntl(log[1], F_SETFL, 0), 0);
+    }
+    // An earlier recording: so there is something to say at the start.
+    std::ofstream(folder_ / "flight.mcap") << "earlier";
+    const UdpAutopilot autopilot(now_of_ours(), kPort);
+    const std::string more = fmt::format("autosave: 0\nrecord: {}\n", (folder_ / "flight.mcap").string());
+    const pid_t session = start(config(map_line() + more), log[1]);
+    ::close(log[1]);
+    int status = -1;
+    const Time begun = now_of_ours();
+    while (::waitpid(session, &status, WNOHANG) == 0) {
+      if (fs::exists(folder_ / "map.bt")) {  // all that is left is to say so
+        if (!closed) ::close(log[0]);
+        ::waitpid(session, &status, 0);
+        break;
+      }
+      if (seconds_between(begun, now_of_ours()) > 30) ::kill(session, SIGKILL);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    EXPECT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+    EXPECT_TRUE(fs::exists(folder_ / "map.bt"));
+    fs::remove(folder_ / "map.bt");
+  }
 }
 
 TEST_F(LiveCommand, CheckFindsWhatIsThereAndWhatIsNot) {

@@ -13,6 +13,8 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
 #include "pade/io/atomic_output.hpp"
 #include "pade/live/camera/folder_source.hpp"
@@ -153,9 +155,20 @@ Status check_parts(LiveParts& parts) {
   return good ? Status() : Status(Error{"something is missing (see above)"});
 }
 
-/// On standard error. A log that cannot be written (its disk is full, the terminal has gone) costs the log,
-/// not the flight.
-void say(const std::string& text) { (void)std::fputs(text.c_str(), stderr); }
+/// On standard error. A log that cannot be written (its disk is full, the terminal has gone, nobody reads the
+/// pipe) costs the log, not the flight: lines that would have to wait are left out, and that is said once
+/// there is room.
+void say(const std::string& text) {
+  static std::atomic<std::size_t> left_out{0};
+  pollfd log{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&log, 1, 0) != 1 || (log.revents & POLLOUT) == 0) {
+    ++left_out;
+    return;
+  }
+  if (const std::size_t lines = left_out.exchange(0); lines > 0)
+    (void)std::fputs(fmt::format("({} lines were left out: nobody read them)\n", lines).c_str(), stderr);
+  (void)std::fputs(text.c_str(), stderr);
+}
 
 /// The page and Foxglove, where they are asked for.
 class Web {
@@ -342,6 +355,7 @@ std::string recorded(live::SessionRecorder& recorder) {
 Status run_live(const LiveArguments& arguments) {
   io::watch_for_interrupts();
   (void)std::signal(SIGHUP, SIG_IGN);  // a terminal out of radio range must not end the flight's map
+  if (!arguments.check) (void)std::signal(SIGPIPE, SIG_IGN);  // nor must whoever read its log
   auto parts = open_parts(arguments);
   if (!parts) return parts.error();
   const live::LiveOptions& options = parts->options;
@@ -427,7 +441,7 @@ void add_live(CLI::App& app, Context& context) {
   command->callback([arguments, &context] {
     const Status status = run_live(*arguments);
     if (status) return;
-    fmt::print(stderr, "pade live: {}\n", status.error().message);
+    say(fmt::format("pade live: {}\n", status.error().message));
     context.exit_code = 1;
   });
 }
