@@ -250,9 +250,9 @@ TEST_F(MapOnDisk, IsOnTheDiskItselfAndSoIsTheRecording) {
   ASSERT_TRUE(last.write_last(map));
   expect_whole("end.ot", ".end.ot.partial");
 
-  Camera camera;
-  camera.width = camera.height = 8;
-  auto recorder = SessionRecorder::create(file("flight.mcap"), camera, {});
+  Camera small;
+  small.width = small.height = 8;
+  auto recorder = SessionRecorder::create(file("flight.mcap"), small, {});
   ASSERT_TRUE(recorder) << recorder.error().message;
   (*recorder)->take({cv::Mat::zeros(8, 8, CV_8UC1), Time{1'000'000'000}, Pose{}, Matrix6d::Zero()});
   ASSERT_TRUE((*recorder)->finish());

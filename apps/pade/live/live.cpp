@@ -345,11 +345,16 @@ Status save_map(const live::Session& session, live::MapSaver& saver, const std::
 
 /// Where the recording is, or why there is none.
 std::string recorded(live::SessionRecorder& recorder) {
-  if (const Status finished = recorder.finish(); !finished) return finished.error().message + "\n";
-  const std::size_t lost = recorder.left_out();
-  return fmt::format(
-      "{}: the frames of the map{}\n", recorder.file().string(),
-      lost > 0 ? fmt::format(", without {} that the disk was too slow for", lost) : std::string());
+  const Status finished = recorder.finish();
+  const live::RecorderReport report = recorder.report();
+  if (!finished)
+    return fmt::format("{}{}\n", finished.error().message,
+                       report.left_out > 0 ? fmt::format(" ({} frames are missing)", report.left_out) : "");
+  std::string text = fmt::format("{}: the frames of the map", report.file.string());
+  if (report.left_out > 0)
+    text += fmt::format(", without {}, for which {}", report.left_out,
+                        report.ended.empty() ? "the disk was too slow" : report.ended);
+  return text + "\n";
 }
 
 Status run_live(const LiveArguments& arguments) {
@@ -387,6 +392,8 @@ Status run_live(const LiveArguments& arguments) {
     auto made = live::SessionRecorder::create(options.record, camera.camera(), camera.mask());
     if (!made) return made.error();
     recorder = std::move(*made);
+    for (const std::string& earlier : recorder->report().earlier)
+      say(fmt::format("{}: recorded by an earlier session\n", earlier));
   }
   auto session = live::Session::create(
       {*parts->camera.source, *parts->link, sinks, progress, parts->camera.T_body_camera, recorder.get()},
