@@ -1,5 +1,6 @@
 // `pade live` as systemd and people run it: a process, an autopilot on the other end of the line, and
 // signals.
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -146,6 +147,27 @@ TEST_F(LiveCommand, OutlivesWhoeverReadsItsLog) {
     EXPECT_TRUE(fs::exists(folder_ / "map.bt"));
     fs::remove(folder_ / "map.bt");
   }
+}
+
+/// A map that cannot be written is heard of in flight, and not at its end.
+TEST_F(LiveCommand, TellsThePilotOfAMapThatCannotBeSaved) {
+  record(200);
+  fs::create_directory(folder_ / "map.bt");  // in its way
+  const pid_t session = start(config(map_line() + "autosave: 0.1\n"));
+  const UdpAutopilot autopilot(now_of_ours(), kPort);
+  const Time begun = now_of_ours();
+  const auto told = [&] {
+    const auto texts = autopilot.texts();
+    return std::count(texts.begin(), texts.end(), "PADE: the map cannot be saved");
+  };
+  while (told() == 0 && seconds_between(begun, now_of_ours()) < 18)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(told(), 1);
+  EXPECT_THAT(said(), HasSubstr("the map cannot be saved: "));
+  ::kill(session, SIGTERM);
+  int status = -1;
+  ::waitpid(session, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << said();
 }
 
 TEST_F(LiveCommand, CheckFindsWhatIsThereAndWhatIsNot) {

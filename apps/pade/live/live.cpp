@@ -281,6 +281,43 @@ class LiveLog {
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 
+/// What is wrong with the files, as soon as it is: in the log, and once to the pilot.
+class FileTroubles {
+ public:
+  FileTroubles(const live::MapSaver* saver, const live::SessionRecorder* recorder)
+      : saver_(saver), recorder_(recorder) {}
+  void maybe(live::AutopilotLink& link) {
+    constexpr double kPause = 1;  // s
+    const Time now = live::now_of_ours();
+    if (seconds_between(last_, now) < kPause) return;
+    last_ = now;
+    if (saver_ != nullptr) {
+      const live::SaverReport report = saver_->report();
+      if (std::exchange(failed_, report.failed) != report.failed) {
+        say(fmt::format("the map cannot be saved: {}\n", report.error));
+        link.warn("the map cannot be saved");
+      }
+    }
+    if (recorder_ != nullptr) {
+      const live::RecorderReport report = recorder_->report();
+      if (!report.ended.empty() && std::exchange(ended_, report.ended) != report.ended) {
+        say(fmt::format("nothing more is recorded: {}\n", report.ended));
+        link.warn("nothing more is recorded");
+      }
+      if (std::exchange(any_left_out_, report.left_out > 0) != (report.left_out > 0) && report.ended.empty())
+        say("the disk is too slow for the recording: frames are left out, it will not make the same map\n");
+    }
+  }
+
+ private:
+  const live::MapSaver* saver_;
+  const live::SessionRecorder* recorder_;
+  std::size_t failed_ = 0;
+  bool any_left_out_ = false;
+  std::string ended_;
+  Time last_;
+};
+
 /// Tells systemd that all threads get on, each second. Called by the mapper's thread, so that one that is
 /// stuck says nothing.
 class Pulse {
@@ -404,6 +441,7 @@ Status run_live(const LiveArguments& arguments) {
     const LinkThread thread(*parts->link, progress);
     LiveLog log;
     Pulse pulse(service, thread);
+    FileTroubles troubles(saver ? &*saver : nullptr, recorder.get());
     service.ready();
     const Time start = live::now_of_ours();
     session->run([&] {
@@ -411,6 +449,7 @@ Status run_live(const LiveArguments& arguments) {
       log.maybe(progress, parts->link->report(), *session, web.get());
       if (web) web->maybe(session->counts(), stamps);
       pulse.maybe(*parts->link);
+      troubles.maybe(*parts->link);
       const bool over =
           arguments.seconds > 0 && seconds_between(start, live::now_of_ours()) > arguments.seconds;
       return over || io::interrupted();

@@ -422,6 +422,22 @@ TEST(AutopilotLink, TakesAnotherAutopilotOnceTheFirstIsGone) {
   EXPECT_EQ(bench.link().report().autopilot->system, 9);
 }
 
+TEST(AutopilotLink, WarnsOfEachThingOnce) {
+  Bench bench;
+  bench.run(5);
+  bench.texts.clear();
+  for (int i = 0; i < 300; ++i) {
+    bench.link().warn(i % 2 == 0 ? "the map cannot be saved" : "nothing more is recorded");
+    bench.camera = i < 100;
+    bench.run(0.01);
+  }
+  ASSERT_EQ(bench.texts.size(), 3U);
+  EXPECT_EQ(bench.texts[0].second, "PADE: the map cannot be saved");
+  EXPECT_EQ(bench.texts[1].second, "PADE: nothing more is recorded");
+  EXPECT_THAT(bench.texts[2].second, HasSubstr("no image from the camera"));
+  EXPECT_GE(seconds_between(bench.texts[0].first, bench.texts[1].first), 0.99);
+}
+
 TEST(AutopilotLink, SaysThatItEnds) {
   Bench bench;
   bench.run(5);

@@ -24,6 +24,7 @@ constexpr std::uint8_t kWarning = 4;             // MAV_SEVERITY
 constexpr std::uint8_t kInformation = 6;
 constexpr std::uint16_t kSetMessageInterval = 511;  // MAV_CMD_SET_MESSAGE_INTERVAL
 constexpr double kOldest = 0.3;                     // age of a frame behind sectors, s
+constexpr double kBetweenTexts = 1;                 // s
 
 Time later(Time time, double seconds) {
   return {time.nanoseconds + static_cast<std::int64_t>(seconds * 1e9)};
@@ -76,6 +77,7 @@ void AutopilotLink::step(Time now, const Progress& progress) {
   if (!report_.autopilot) return;
   ask(now);
   send_sectors(now);
+  send_warning(now);
   send_health(now, progress);
 }
 
@@ -212,10 +214,22 @@ void AutopilotLink::send_sectors(Time now) {
   offered_.reset();
 }
 
+void AutopilotLink::warn(const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  if (warned_.insert(text).second) warnings_.push_back(text);
+}
+
+void AutopilotLink::send_warning(Time now) {
+  if (warnings_.empty() || now < next_text_) return;
+  say(kWarning, warnings_.front());
+  warnings_.pop_front();
+  next_text_ = later(now, kBetweenTexts);
+}
+
 /// A heartbeat each second, and at once where something has changed, but not more often than a line and a
 /// pilot can take.
 void AutopilotLink::send_health(Time now, const Progress& progress) {
-  constexpr double kBetweenHeartbeats = 0.1, kBetweenTexts = 1;  // s
+  constexpr double kBetweenHeartbeats = 0.1;  // s
   const auto newest = clock_.to_ours(poses_->newest());
   const bool any = poses_->newest().nanoseconds != 0 && newest.has_value();
   progress_.synchronised = clock_.synchronised(now);

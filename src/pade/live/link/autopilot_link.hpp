@@ -4,9 +4,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -114,6 +116,9 @@ class AutopilotLink : public NavigationSource {
   /// that were not sent are forgotten. Those that say nothing are not sent, since receivers would take them
   /// for a sign of health.
   void offer(const FrameObstacles& obstacles, Time frame);
+  /// Tells the pilot something that is no missing input, once however often it is asked for.
+  /// @param text  at most the 44 characters that a STATUSTEXT has left
+  void warn(const std::string& text);
   /// Says that there will be no more sectors. To be called when nobody calls step() any more.
   void end();
   [[nodiscard]] LinkReport report() const;
@@ -130,6 +135,7 @@ class AutopilotLink : public NavigationSource {
   [[nodiscard]] bool in_faces() const;
   /// Of the autopilot's clock, of the poses of the frame that is offered.
   [[nodiscard]] std::optional<Time> offered_pose_time() const;
+  void send_warning(Time now);
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);
   void send_heartbeat(std::uint8_t state);
@@ -154,6 +160,8 @@ class AutopilotLink : public NavigationSource {
   std::optional<FrameObstacles> offered_;
   Time offered_frame_;
   LinkProgress progress_;
+  std::deque<std::string> warnings_;  // to be said
+  std::set<std::string> warned_;      // all so far
 };
 
 }  // namespace pade::live
