@@ -341,6 +341,9 @@ std::string summary(const live::SessionCounts& counts, const live::LinkReport& l
   std::string text = fmt::format(
       "{} frames: {} mapped, {} skipped, {} dropped for newer ones; {} sectors sent, {} too old to be sent\n",
       counts.frames, counts.mapped, counts.skipped, counts.dropped, link.sectors_sent, link.sectors_stale);
+  if (link.sectors_empty > 0)
+    text += fmt::format("  {} sectors that say nothing, so that the autopilot can be armed at rest\n",
+                        link.sectors_empty);
   for (const auto& [reason, count] : counts.reasons) text += fmt::format("  skipped {}: {}\n", count, reason);
   if (const std::size_t jumps = counts.restarts - counts.borders; jumps > 0)
     text += fmt::format("  {} maps begun anew because the poses jumped\n", jumps);

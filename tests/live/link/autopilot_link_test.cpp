@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -66,7 +67,8 @@ class Bench {
       if (depth) progress_.depth = now_.nanoseconds - 120 * kMillisecond;
       const std::int64_t ms = now_.nanoseconds / kMillisecond;
       const auto boot = static_cast<std::uint32_t>(ms - 1'000'000);
-      if (heartbeat && ms % 1000 == 0) tell(mavlink::Heartbeat{2, kind, 0, 0, 4, 3});
+      if (heartbeat && ms % 1000 == 0)
+        tell(mavlink::Heartbeat{2, kind, static_cast<std::uint8_t>(armed ? 0x81 : 0x01), 0, 4, 3});
       if (poses && ms % 20 == 0) {
         const double half = 0.5e-3 * turn_rate * static_cast<double>(ms % 1'000'000);
         tell(mavlink::AttitudeQuaternion{boot,
@@ -119,6 +121,7 @@ class Bench {
   bool heartbeat = true, poses = true, questions = false, answers = true;
   bool camera = true, mapper = true, depth = true, positions = true;
   std::uint8_t kind = px4_kind;
+  bool armed = true;
   std::uint8_t ack = 0;
   double turn_rate = 0;  ///< clockwise, rad/s
   mavlink::ObstacleDistance last_sectors;
@@ -420,6 +423,51 @@ TEST(AutopilotLink, TakesAnotherAutopilotOnceTheFirstIsGone) {
   EXPECT_EQ(bench.link().report().autopilot->system, 7);  // of another vehicle, for all that we know
   bench.run(4);
   EXPECT_EQ(bench.link().report().autopilot->system, 9);
+}
+
+/// Its pre-arm check wants a proximity sensor that speaks; what is said is nothing, and only at rest.
+TEST(AutopilotLink, ArduPilotCanBeArmedAtRest) {
+  Bench bench;
+  bench.kind = ardupilot_kind;
+  bench.armed = bench.depth = false;
+  bench.run(5);
+  const Time first = bench.now();
+  bench.sectors.clear();
+  bench.run(3);
+  ASSERT_FALSE(bench.sectors.empty());
+  Time last = first;
+  for (const Time time : bench.sectors) EXPECT_LT(seconds_between(std::exchange(last, time), time), 0.4);
+  EXPECT_LT(seconds_between(last, bench.now()), 0.4);
+  for (const std::uint16_t d : bench.last_sectors.distances) EXPECT_EQ(d, kUnknownDistance);
+  EXPECT_EQ(bench.link().report().sectors_sent, 0U);
+  EXPECT_GE(bench.link().report().sectors_empty, bench.sectors.size());
+  EXPECT_NE(bench.heartbeats.back().state, kActiveState);
+  EXPECT_EQ(bench.link().report().missing, Missing::depth) << "that is still what the pilot is told";
+  // What is really wrong keeps it from being armed.
+  for (bool Bench::*const input : {&Bench::camera, &Bench::poses, &Bench::mapper, &Bench::heartbeat}) {
+    bench.*input = false;
+    bench.run(2);
+    bench.sectors.clear();
+    bench.run(2);
+    EXPECT_TRUE(bench.sectors.empty());
+    bench.*input = true;
+    bench.run(3);
+    bench.sectors.clear();
+    bench.run(1);
+    EXPECT_FALSE(bench.sectors.empty());
+  }
+  bench.armed = true;
+  bench.run(1);  // until its heartbeat says so
+  bench.sectors.clear();
+  bench.run(5);
+  EXPECT_TRUE(bench.sectors.empty());
+}
+
+TEST(AutopilotLink, NothingIsSentToPx4AtRest) {
+  Bench bench;
+  bench.armed = bench.depth = false;
+  bench.run(6);
+  EXPECT_TRUE(bench.sectors.empty());
 }
 
 TEST(AutopilotLink, WarnsOfEachThingOnce) {

@@ -23,6 +23,7 @@ constexpr std::uint8_t kVersion = 3;             // of MAVLink, as all heartbeat
 constexpr std::uint8_t kWarning = 4;             // MAV_SEVERITY
 constexpr std::uint8_t kInformation = 6;
 constexpr std::uint16_t kSetMessageInterval = 511;  // MAV_CMD_SET_MESSAGE_INTERVAL
+constexpr std::uint8_t kArmed = 128;                // MAV_MODE_FLAG_SAFETY_ARMED
 constexpr double kOldest = 0.3;                     // age of a frame behind sectors, s
 constexpr double kBetweenTexts = 1;                 // s
 
@@ -79,6 +80,7 @@ void AutopilotLink::step(Time now, const Progress& progress) {
   send_sectors(now);
   send_warning(now);
   send_health(now, progress);
+  send_for_arming(now);
 }
 
 void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
@@ -91,6 +93,7 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     if (!same)
       report_.autopilot = Autopilot{frame.system, frame.component, heartbeat->autopilot, heartbeat->type};
     heard_ = now;
+    armed_ = (heartbeat->base_mode & kArmed) != 0;
     poses_->listen_to(*report_.autopilot);
     port_->answer_sender();
     sender_.system = frame.system;  // PX4 drops what another system sends
@@ -210,8 +213,24 @@ void AutopilotLink::send_sectors(Time now) {
   } else if (in_faces() && offered_->points ? send_points() : offered_->level && send_level()) {
     ++report_.sectors_sent;
     progress_.sent = offered_frame_.nanoseconds;
+    obstacles_sent_ = now;
   }
   offered_.reset();
+}
+
+void AutopilotLink::send_for_arming(Time now) {
+  constexpr double kHeartbeat = 1.5, kPause = 0.2;  // s; ArduPilot waits for 0.5 s
+  const Missing missing = report_.missing;
+  const bool all_but_depth =
+      missing == Missing::nothing || missing == Missing::depth || missing == Missing::view;
+  if (report_.autopilot->kind != ardupilot_kind || armed_ || seconds_between(heard_, now) > kHeartbeat ||
+      !all_but_depth || seconds_between(obstacles_sent_, now) < kPause)
+    return;
+  mavlink::ObstacleDistance nothing = obstacle_distance_message({}, now, {});
+  nothing.distances.fill(kUnknownDistance);
+  if (!send(nothing)) return;
+  ++report_.sectors_empty;
+  obstacles_sent_ = now;
 }
 
 void AutopilotLink::warn(const std::string& text) {

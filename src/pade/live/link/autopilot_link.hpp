@@ -81,6 +81,7 @@ struct LinkReport {
   std::size_t sectors_sent = 0;   ///< frames whose obstacles were sent
   bool level_instead = false;     ///< of OBSTACLE_DISTANCE_3D, which this autopilot does not know
   std::size_t sectors_stale = 0;  ///< too old when their turn came, so not sent
+  std::size_t sectors_empty = 0;  ///< that said nothing, sent so that ArduPilot can be armed at rest
   std::size_t unsent = 0;         ///< packets that the port did not take
   std::string refused;            ///< the last request that the autopilot refused; empty if none
   Missing missing = Missing::autopilot;
@@ -97,7 +98,10 @@ struct FrameObstacles {
   double time_offset = 0;                              ///< time of the pose = time of the frame + this, s
 };
 
-/// One for each autopilot. step() belongs to one thread, all else to any.
+/// One for each autopilot. At rest there is no parallax, and ArduPilot refuses to be armed where nothing has
+/// come from its proximity sensor for half a second. So while its heartbeat says that it is disarmed, and all
+/// but depth is there, it is sent OBSTACLE_DISTANCE that says nothing of any sector; never once it is armed.
+/// step() belongs to one thread, all else to any.
 class AutopilotLink : public NavigationSource {
  public:
   /// @param navigator  of our own filter; both options such as check() accepts
@@ -135,6 +139,7 @@ class AutopilotLink : public NavigationSource {
   [[nodiscard]] bool in_faces() const;
   /// Of the autopilot's clock, of the poses of the frame that is offered.
   [[nodiscard]] std::optional<Time> offered_pose_time() const;
+  void send_for_arming(Time now);
   void send_warning(Time now);
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);
@@ -149,6 +154,8 @@ class AutopilotLink : public NavigationSource {
   mavlink::Sender sender_;
   Time next_question_, next_request_, next_heartbeat_, next_text_, earliest_heartbeat_;
   Time heard_;                        // the autopilot's heartbeat, last
+  bool armed_ = true;                 // by that heartbeat
+  Time obstacles_sent_;               // last, whether or not they said anything
   std::string said_;                  // in the last text
   std::vector<WantedMessage> asked_;  // how many had come when the streams were last asked for
   std::uint32_t last_stamp_ = 0;      // of points, ms
