@@ -423,6 +423,7 @@ TEST(AutopilotLink, TakesAnotherAutopilotOnceTheFirstIsGone) {
   EXPECT_EQ(bench.link().report().autopilot->system, 7);  // of another vehicle, for all that we know
   bench.run(4);
   EXPECT_EQ(bench.link().report().autopilot->system, 9);
+  EXPECT_EQ(bench.link().report().jumps, 1U) << "its poses are of another world";
 }
 
 /// Its pre-arm check wants a proximity sensor that speaks; what is said is nothing, and only at rest.

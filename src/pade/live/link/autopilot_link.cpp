@@ -90,6 +90,7 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     constexpr double kGone = 5;  // s
     const bool same = report_.autopilot && report_.autopilot->system == frame.system;
     if (!same && report_.autopilot && seconds_between(heard_, now) < kGone) return;  // of another vehicle
+    if (!same && report_.autopilot) clock_ = LinkClock();
     if (!same)
       report_.autopilot = Autopilot{frame.system, frame.component, heartbeat->autopilot, heartbeat->type};
     heard_ = now;

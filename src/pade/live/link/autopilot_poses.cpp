@@ -20,6 +20,15 @@ using mavlink::unpack;
 constexpr double kKept = 3;              // s
 constexpr double kFarthestApart = 0.25;  // s
 
+/// How far a quantity may be off what its rates at both ends say, after so many seconds: beside the error and
+/// its growth what may change unseen between messages that are far apart. Below 0, so that nothing is
+/// explained, where that is too long.
+double explained(double dt, double error, double growth, double acceleration) {
+  constexpr double kTooLong = 2;  // s
+  const double unseen = dt > kFarthestApart ? acceleration * dt * dt / 2 : 0;
+  return dt > kTooLong ? -1 : error + growth * dt + unseen;
+}
+
 Time since_start(std::uint32_t ms) { return {static_cast<std::int64_t>(ms) * 1'000'000}; }
 
 Quaterniond quaternion(float w, float x, float y, float z) {
@@ -68,6 +77,16 @@ bool AutopilotPoses::push(Samples& samples, Time time, const Value& value) {
   return true;
 }
 
+void AutopilotPoses::listen_to(const Autopilot& autopilot) {
+  const bool same =
+      autopilot_ && autopilot_->system == autopilot.system && autopilot_->component == autopilot.component;
+  if (same) return;
+  if (autopilot_) jump();
+  autopilot_ = autopilot;
+  quaternions_ = false;
+  reset_counter_ = -1;
+}
+
 void AutopilotPoses::jump() {
   attitudes_.clear();
   positions_.clear();
@@ -83,10 +102,12 @@ void AutopilotPoses::add_attitude(Time time, const Quaterniond& q_ned_frd, doubl
   const Quaterniond turn = (R_enu_ned * q_ned_frd * R_frd_flu).normalized();
   if (!attitudes_.empty()) {
     // A heading that is set anew: no vehicle turns by that much and says that it does not.
-    constexpr double kUnsaid = 0.15;  // rad
+    constexpr double kUnsaid = 0.15;      // rad
+    constexpr double kUnseenTurning = 3;  // rad/s^2
     const double dt = seconds_between(attitudes_.back().time, time);
-    const double most = std::max(rate_, rate) * dt + kUnsaid;  // NaN: compares as false
-    if (dt > 0 && dt <= kFarthestApart && attitudes_.back().value.angularDistance(turn) > most) jump();
+    const double most = explained(dt, kUnsaid, std::max(rate_, rate), kUnseenTurning);
+    const bool known = std::isfinite(rate_) && std::isfinite(rate);
+    if (known && dt > 0 && attitudes_.back().value.angularDistance(turn) > most) jump();
   }
   if (!push(attitudes_, time, turn)) return;
   rate_ = rate;
@@ -98,11 +119,13 @@ void AutopilotPoses::add_position(Time time, const Vector3d& ned, const Vector3d
   const Vector3d place(ned.y(), ned.x(), -ned.z());
   const Vector3d velocity(velocity_ned.y(), velocity_ned.x(), -velocity_ned.z());
   if (!positions_.empty()) {
-    constexpr double kUnsaid = 0.3;       // m
-    constexpr double kUnsaidSpeed = 0.5;  // m/s
+    constexpr double kUnsaid = 0.3;        // m
+    constexpr double kUnsaidSpeed = 0.5;   // m/s
+    constexpr double kUnseenSpeeding = 3;  // m/s^2
     const double dt = seconds_between(positions_.back().time, time);
     const Vector3d expected = positions_.back().value + dt / 2 * (velocity_ + velocity);
-    if (dt > 0 && dt <= kFarthestApart && (place - expected).norm() > kUnsaid + kUnsaidSpeed * dt) jump();
+    const double most = explained(dt, kUnsaid, kUnsaidSpeed, kUnseenSpeeding);
+    if (dt > 0 && expected.allFinite() && (place - expected).norm() > most) jump();
   }
   if (!push(positions_, time, place)) return;
   velocity_ = velocity;
