@@ -195,6 +195,32 @@ TEST_F(LiveCommand, ShowsItselfOverTheNetworkWhereThatIsAskedFor) {
   EXPECT_THAT(test::shell(fmt::format("{} live {}", test::kPade, file)).text, Not(HasSubstr("24583")));
 }
 
+/// As the service, whose configuration is in /etc and whose folder is its own.
+TEST_F(LiveCommand, LooksForItsInputsBesideItsConfiguration) {
+  record(2);
+  fs::create_directory(folder_ / "state");
+  std::ofstream(folder_ / "live.yaml") << fmt::format(
+      "camera: {{kind: folder, path: flight, calibration: missing.yaml}}\n"
+      "link: {{port: \"udp:{}\"}}\nmap: map.bt\n",
+      kPort);
+  const std::string command =
+      fmt::format("cd {} && {} live ../live.yaml", (folder_ / "state").string(), test::kPade);
+  EXPECT_THAT(test::shell(command).text, AllOf(HasSubstr("../missing.yaml"), Not(HasSubstr("state"))));
+  fs::rename(folder_ / "flight" / "camera.yaml", folder_ / "missing.yaml");
+  EXPECT_THAT(test::shell(command).text, HasSubstr("2 frames: "));
+}
+
+TEST_F(LiveCommand, TheServiceIsStartedAgainHoweverOftenItFails) {
+  const auto unit = io::read_file(fs::path(PADE_SOURCE_DIR) / "config" / "systemd" / "pade-live@.service.in");
+  ASSERT_TRUE(unit);
+  const auto section = [&](const std::string& name) {
+    const std::size_t begin = unit->find(name);
+    return unit->substr(begin, unit->find("\n[", begin) - begin);
+  };
+  EXPECT_THAT(section("[Unit]"), HasSubstr("\nStartLimitIntervalSec=0\n"));
+  EXPECT_THAT(section("[Service]"), HasSubstr("\nRestart=on-failure\n"));
+}
+
 TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
   record(3);
   const struct {

@@ -81,6 +81,9 @@ Result<LiveOptions> read_live_options(const fs::path& file) {
   if (!text) return text.error();
   LiveOptions options;
   if (const Status status = io::from_yaml(*text, file.string(), options); !status) return status.error();
+  for (std::string* const input : {&options.camera.path, &options.camera.calibration}) {
+    if (!input->empty()) *input = (file.parent_path() / *input).string();  // an absolute one stays
+  }
   return options;
 }
 

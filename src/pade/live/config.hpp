@@ -83,7 +83,9 @@ Status check(const LiveOptions& options);
 /// @param file   empty: none is written
 Status check_place(const std::string& field, const std::string& file);
 
-/// Reads the YAML of a session. Errors name file, line and field.
+/// Reads the YAML of a session. Errors name file, line and field. What is read (camera.calibration,
+/// camera.path) lies beside the file where its name is relative; what is written goes to the folder in which
+/// the program runs.
 Result<LiveOptions> read_live_options(const std::filesystem::path& file);
 
 /// A camera, and where it sits.
