@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "pade/live/mavlink/estimate_messages.hpp"
+#include "pade/live/mavlink/sensor_messages.hpp"
 
 namespace pade::live {
 namespace {
@@ -69,7 +70,8 @@ class Bench {
       const auto boot = static_cast<std::uint32_t>(ms - 1'000'000);
       if (heartbeat && ms % 1000 == 0)
         tell(mavlink::Heartbeat{2, kind, static_cast<std::uint8_t>(armed ? 0x81 : 0x01), 0, 4, 3});
-      if (poses && ms % 20 == 0) {
+      if (gnss && ms % 200 == 0) tell(mavlink::GpsRawInt{.fix_type = 3, .satellites_visible = 11});
+      if (poses && attitudes && ms % 20 == 0) {
         const double half = 0.5e-3 * turn_rate * static_cast<double>(ms % 1'000'000);
         tell(mavlink::AttitudeQuaternion{boot,
                                          static_cast<float>(std::cos(half)),
@@ -119,7 +121,8 @@ class Bench {
   }
 
   bool heartbeat = true, poses = true, questions = false, answers = true;
-  bool camera = true, mapper = true, depth = true, positions = true;
+  bool camera = true, mapper = true, depth = true, positions = true, attitudes = true;
+  bool gnss = false;
   std::uint8_t kind = px4_kind;
   bool armed = true;
   std::uint8_t ack = 0;
@@ -329,6 +332,36 @@ TEST(AutopilotLink, NamesTheMessageThatThePosesLack) {
   EXPECT_THAT(report.poses_summary, ::testing::MatchesRegex("[1-9][0-9][0-9]+ attitudes, 0 positions"));
   EXPECT_THAT(bench.texts.back().second, HasSubstr("no LOCAL_POSITION_NED"));
   EXPECT_GE(bench.commands.size(), 4U) << "plenty of attitudes are no reason to stop asking for positions";
+}
+
+/// When GNSS is lost the positions stop and the attitudes go on: that is no cable.
+TEST(AutopilotLink, NamesTheMessageThatHasStopped) {
+  for (bool Bench::*const input : {&Bench::positions, &Bench::attitudes}) {
+    Bench bench;
+    bench.run(5);
+    ASSERT_EQ(bench.link().report().missing, Missing::nothing);
+    bench.*input = false;
+    bench.texts.clear();
+    bench.run(3);
+    ASSERT_EQ(bench.texts.size(), 1U);
+    EXPECT_THAT(
+        bench.texts.back().second,
+        HasSubstr(input == &Bench::positions ? "no pose: no LOCAL_POSITION_NED" : "no pose: no ATTITUDE"));
+    EXPECT_NE(bench.heartbeats.back().state, kActiveState);
+  }
+}
+
+TEST(AutopilotLink, WhatTheReceiverSaidIsNotKeptForEver) {
+  Bench bench;
+  bench.gnss = true;
+  bench.run(2);
+  ASSERT_TRUE(bench.link().report().gnss);
+  EXPECT_EQ(bench.link().report().gnss->satellites, 11);
+  bench.gnss = false;
+  bench.run(2.5);
+  EXPECT_TRUE(bench.link().report().gnss);
+  bench.run(1);
+  EXPECT_FALSE(bench.link().report().gnss);
 }
 
 /// They are of the exposure, a quarter of a second ago; in the meantime the vehicle has moved and turned.

@@ -112,8 +112,10 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     if (ours && ack->result != 0 && ack->result != kInProgress)
       report_.refused = fmt::format("command {} (result {})", ack->command, ack->result);
   }
-  if (const auto gnss = mavlink::unpack<mavlink::GpsRawInt>(frame))
+  if (const auto gnss = mavlink::unpack<mavlink::GpsRawInt>(frame)) {
     report_.gnss = GnssState{gnss->fix_type, gnss->satellites_visible};
+    gnss_heard_ = now;
+  }
   poses_->add(frame);
 }
 
@@ -316,6 +318,8 @@ void AutopilotLink::refresh_report(Time now) {
   report_.poses = poses_->count();
   report_.jumps = poses_->jumps();
   report_.poses_come = poses_->newest().nanoseconds != 0;
+  constexpr double kGnssGone = 3;  // s
+  if (seconds_between(gnss_heard_, now) > kGnssGone) report_.gnss.reset();
 }
 
 LinkReport AutopilotLink::report() const {

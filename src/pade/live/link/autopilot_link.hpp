@@ -76,7 +76,7 @@ struct LinkReport {
   std::string poses_missing;      ///< why there are none; empty if there are
   std::string poses_summary;      ///< what has come for them
   std::size_t jumps = 0;          ///< of the poses
-  std::optional<GnssState> gnss;  ///< empty: GPS_RAW_INT has not come
+  std::optional<GnssState> gnss;  ///< empty: GPS_RAW_INT has not come for three seconds
   bool poses_come = false;        ///< so that there are poses
   std::size_t sectors_sent = 0;   ///< frames whose obstacles were sent
   bool level_instead = false;     ///< of OBSTACLE_DISTANCE_3D, which this autopilot does not know
@@ -155,6 +155,7 @@ class AutopilotLink : public NavigationSource {
   Time next_question_, next_request_, next_heartbeat_, next_text_, earliest_heartbeat_;
   Time heard_;                        // the autopilot's heartbeat, last
   bool armed_ = true;                 // by that heartbeat
+  Time gnss_heard_;                   // GPS_RAW_INT, last
   Time obstacles_sent_;               // last, whether or not they said anything
   std::string said_;                  // in the last text
   std::vector<WantedMessage> asked_;  // how many had come when the streams were last asked for

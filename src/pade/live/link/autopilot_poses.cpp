@@ -206,9 +206,16 @@ std::vector<WantedMessage> AutopilotPoses::wanted(double pose_rate) const {
 }
 
 std::string AutopilotPoses::missing() {
-  if (newest().nanoseconds != 0) return {};
-  if (messages_ == PoseMessages::odometry) return "no ODOMETRY in LOCAL_NED";
-  return attitudes_come_ == 0 ? "no ATTITUDE" : "no LOCAL_POSITION_NED";
+  if (messages_ == PoseMessages::odometry)
+    return newest().nanoseconds != 0 ? std::string() : std::string("no ODOMETRY in LOCAL_NED");
+  if (attitudes_.empty()) return "no ATTITUDE";
+  if (positions_.empty()) return "no LOCAL_POSITION_NED";
+  // Both have come; where one has stopped and the other goes on, it is no cable.
+  constexpr double kStopped = 0.3;  // s; less than what is called stale
+  const double ahead = seconds_between(positions_.back().time, attitudes_.back().time);
+  if (ahead > kStopped) return "no LOCAL_POSITION_NED";
+  if (ahead < -kStopped) return "no ATTITUDE";
+  return {};
 }
 
 std::string AutopilotPoses::summary() {

@@ -42,6 +42,7 @@ class AutopilotPoses : public PoseSource {
   /// Of the newest pose that can be answered; the start of time if there is none.
   [[nodiscard]] Time newest() override;
   [[nodiscard]] std::vector<WantedMessage> wanted(double pose_rate) const override;
+  /// The message that has not come, or that has stopped while the other goes on.
   [[nodiscard]] std::string missing() override;
   [[nodiscard]] std::string summary() override;
 
