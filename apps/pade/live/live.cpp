@@ -13,8 +13,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <poll.h>
-#include <unistd.h>
 
 #include "pade/io/atomic_output.hpp"
 #include "pade/live/camera/folder_source.hpp"
@@ -28,6 +26,7 @@
 #include "pade/live/web/web_server.hpp"
 
 #include "commands.hpp"
+#include "live/live_log.hpp"
 
 namespace pade::cli {
 namespace {
@@ -155,21 +154,6 @@ Status check_parts(LiveParts& parts) {
   return good ? Status() : Status(Error{"something is missing (see above)"});
 }
 
-/// On standard error. A log that cannot be written (its disk is full, the terminal has gone, nobody reads the
-/// pipe) costs the log, not the flight: lines that would have to wait are left out, and that is said once
-/// there is room.
-void say(const std::string& text) {
-  static std::atomic<std::size_t> left_out{0};
-  pollfd log{STDERR_FILENO, POLLOUT, 0};
-  if (::poll(&log, 1, 0) != 1 || (log.revents & POLLOUT) == 0) {
-    ++left_out;
-    return;
-  }
-  if (const std::size_t lines = left_out.exchange(0); lines > 0)
-    (void)std::fputs(fmt::format("({} lines were left out: nobody read them)\n", lines).c_str(), stderr);
-  (void)std::fputs(text.c_str(), stderr);
-}
-
 /// The page and Foxglove, where they are asked for.
 class Web {
  public:
@@ -232,92 +216,6 @@ class Web {
   std::unique_ptr<live::WebServer> server_;  // last: it uses the others
 };
 
-std::string origin_text(const live::Session& session) {
-  const Eigen::Vector3d& origin = session.origin();
-  return fmt::format("the map's 0 0 0 is {:.2f} m east, {:.2f} m north, {:.2f} m up of that of the poses",
-                     origin.x(), origin.y(), origin.z());
-}
-
-std::string outside_text(const live::SessionCounts& counts) {
-  return fmt::format("{} points lay beyond what a map can hold (mapper.map.voxel)", counts.outside);
-}
-
-/// A line each five seconds, for the log, and what happens between them.
-class LiveLog {
- public:
-  void maybe(const live::Progress& progress, const live::LinkReport& link, const live::Session& session,
-             const Web* web) {
-    constexpr double kPause = 5;  // s
-    const Time now = live::now_of_ours();
-    const live::SessionCounts& counts = session.counts();
-    if (std::exchange(restarts_, counts.restarts) != counts.restarts) {
-      const bool border = std::exchange(borders_, counts.borders) != counts.borders;
-      say(fmt::format(
-          "the map is begun anew, since {}\n",
-          border ? "the vehicle has come near the border of what a map can hold" : "the poses have jumped"));
-    }
-    if (std::exchange(origin_, session.origin()) != session.origin()) say(origin_text(session) + "\n");
-    if (seconds_between(last_, now) < kPause) return;
-    last_ = now;
-    const std::string stamps = live::stamp_text(session.stamp_offset());
-    const auto age = [&](std::int64_t then) {
-      return then == 0 ? std::string("none")
-                       : fmt::format("{:.2f} s old", 1e-9 * static_cast<double>(now.nanoseconds - then));
-    };
-    say(fmt::format("{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
-                    live::text_of(link), age(progress.image), age(progress.depth), link.sectors_sent,
-                    link.in.packets, link.in.bad, link.in.gaps));
-    if (link.level_instead)
-      say("the autopilot does not know OBSTACLE_DISTANCE_3D: it gets OBSTACLE_DISTANCE (link.obstacles: "
-          "level)\n");
-    if (!stamps.empty()) say(stamps + "\n");
-    if (counts.outside > 0) say(outside_text(counts) + "\n");
-    if (web != nullptr) say(web->text() + "\n");
-  }
-
- private:
-  Time last_ = live::now_of_ours();
-  std::size_t restarts_ = 0, borders_ = 0;
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-};
-
-/// What is wrong with the files, as soon as it is: in the log, and once to the pilot.
-class FileTroubles {
- public:
-  FileTroubles(const live::MapSaver* saver, const live::SessionRecorder* recorder)
-      : saver_(saver), recorder_(recorder) {}
-  void maybe(live::AutopilotLink& link) {
-    constexpr double kPause = 1;  // s
-    const Time now = live::now_of_ours();
-    if (seconds_between(last_, now) < kPause) return;
-    last_ = now;
-    if (saver_ != nullptr) {
-      const live::SaverReport report = saver_->report();
-      if (std::exchange(failed_, report.failed) != report.failed) {
-        say(fmt::format("the map cannot be saved: {}\n", report.error));
-        link.warn("the map cannot be saved");
-      }
-    }
-    if (recorder_ != nullptr) {
-      const live::RecorderReport report = recorder_->report();
-      if (!report.ended.empty() && std::exchange(ended_, report.ended) != report.ended) {
-        say(fmt::format("nothing more is recorded: {}\n", report.ended));
-        link.warn("nothing more is recorded");
-      }
-      if (std::exchange(any_left_out_, report.left_out > 0) != (report.left_out > 0) && report.ended.empty())
-        say("the disk is too slow for the recording: frames are left out, it will not make the same map\n");
-    }
-  }
-
- private:
-  const live::MapSaver* saver_;
-  const live::SessionRecorder* recorder_;
-  std::size_t failed_ = 0;
-  bool any_left_out_ = false;
-  std::string ended_;
-  Time last_;
-};
-
 /// Tells systemd that all threads get on, each second. Called by the mapper's thread, so that one that is
 /// stuck says nothing.
 class Pulse {
@@ -336,26 +234,6 @@ class Pulse {
   const LinkThread& link_;
   Time last_;
 };
-
-std::string summary(const live::SessionCounts& counts, const live::LinkReport& link) {
-  std::string text = fmt::format(
-      "{} frames: {} mapped, {} skipped, {} dropped for newer ones; {} sectors sent, {} too old to be sent\n",
-      counts.frames, counts.mapped, counts.skipped, counts.dropped, link.sectors_sent, link.sectors_stale);
-  if (link.sectors_empty > 0)
-    text += fmt::format("  {} sectors that say nothing, so that the autopilot can be armed at rest\n",
-                        link.sectors_empty);
-  for (const auto& [reason, count] : counts.reasons) text += fmt::format("  skipped {}: {}\n", count, reason);
-  if (const std::size_t jumps = counts.restarts - counts.borders; jumps > 0)
-    text += fmt::format("  {} maps begun anew because the poses jumped\n", jumps);
-  if (counts.borders > 0)
-    text +=
-        fmt::format("  {} maps begun anew because the vehicle came near the border of what one can hold\n",
-                    counts.borders);
-  if (counts.outside > 0) text += fmt::format("  {}\n", outside_text(counts));
-  text += fmt::format("link: {} packets, {} bad, {} gaps; {} packets of ours not taken\n", link.in.packets,
-                      link.in.bad, link.in.gaps, link.unsent);
-  return text;
-}
 
 /// @param text  gets what is to be said of it
 Status save_map(const live::Session& session, live::MapSaver& saver, const std::string& file,
@@ -443,13 +321,14 @@ Status run_live(const LiveArguments& arguments) {
   {
     const LinkThread thread(*parts->link, progress);
     LiveLog log;
+    const auto web_text = [&] { return web ? web->text() : std::string(); };
     Pulse pulse(service, thread);
     FileTroubles troubles(saver ? &*saver : nullptr, recorder.get());
     service.ready();
     const Time start = live::now_of_ours();
     session->run([&] {
       const std::string stamps = live::stamp_text(session->stamp_offset());
-      log.maybe(progress, parts->link->report(), *session, web.get());
+      log.maybe(progress, parts->link->report(), *session, web_text);
       if (web) web->maybe(session->counts(), stamps);
       pulse.maybe(*parts->link);
       troubles.maybe(*parts->link);
