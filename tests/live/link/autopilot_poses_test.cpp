@@ -201,6 +201,23 @@ TEST(AutopilotPoses, AGapInOdometryIsNoJumpUnlessItsCounterSaysSo) {
   EXPECT_EQ(poses.jumps(), 1U);
 }
 
+/// Where a position that was set anew is the first to come after a gap, the attitude is not what is missing.
+TEST(AutopilotPoses, AJumpIsNoMissingMessage) {
+  AutopilotPoses poses(PoseMessages::estimate);
+  add_to(poses, facing(1000, 0));
+  EXPECT_EQ(poses.missing(), "no LOCAL_POSITION_NED");
+  add_to(poses, mavlink::LocalPositionNed{1000, 0, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.missing(), "");
+  for (std::uint32_t ms = 1040; ms <= 3000; ms += 40) add_to(poses, facing(ms, 0));
+  EXPECT_EQ(poses.missing(), "no LOCAL_POSITION_NED");
+  add_to(poses, mavlink::LocalPositionNed{3010, 20, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.jumps(), 1U);
+  EXPECT_EQ(poses.missing(), "");
+  for (std::uint32_t ms = 3050; ms <= 3500; ms += 40)
+    add_to(poses, mavlink::LocalPositionNed{ms, 20, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.missing(), "no ATTITUDE") << "now it is";
+}
+
 TEST(AutopilotPoses, AnotherAutopilotIsAJump) {
   AutopilotPoses poses(PoseMessages::estimate);
   poses.listen_to({1, 1, px4_kind, 2});

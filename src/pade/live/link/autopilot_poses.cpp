@@ -208,10 +208,15 @@ std::vector<WantedMessage> AutopilotPoses::wanted(double pose_rate) const {
 std::string AutopilotPoses::missing() {
   if (messages_ == PoseMessages::odometry)
     return newest().nanoseconds != 0 ? std::string() : std::string("no ODOMETRY in LOCAL_NED");
-  if (attitudes_.empty()) return "no ATTITUDE";
-  if (positions_.empty()) return "no LOCAL_POSITION_NED";
-  // Both have come; where one has stopped and the other goes on, it is no cable.
   constexpr double kStopped = 0.3;  // s; less than what is called stale
+  // After a jump either has to come anew, which takes the one a moment longer than the other.
+  const auto alone = [](const auto& samples, std::size_t others) {
+    return others == 0 || samples.empty() ||
+           seconds_between(samples.front().time, samples.back().time) > kStopped;
+  };
+  if (attitudes_.empty()) return alone(positions_, attitudes_come_) ? "no ATTITUDE" : "";
+  if (positions_.empty()) return alone(attitudes_, positions_come_) ? "no LOCAL_POSITION_NED" : "";
+  // Both have come; where one has stopped and the other goes on, it is no cable.
   const double ahead = seconds_between(positions_.back().time, attitudes_.back().time);
   if (ahead > kStopped) return "no LOCAL_POSITION_NED";
   if (ahead < -kStopped) return "no ATTITUDE";
