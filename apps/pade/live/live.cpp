@@ -270,7 +270,7 @@ std::string recorded(live::SessionRecorder& recorder) {
                        report.left_out > 0 ? fmt::format(" ({} frames are missing)", report.left_out) : "");
   std::string text = fmt::format("{}: the frames of the map", report.file.string());
   if (report.left_out > 0)
-    text += fmt::format(", without {}, for which {}", report.left_out,
+    text += fmt::format(", without {} ({})", report.left_out,
                         report.ended.empty() ? "the disk was too slow" : report.ended);
   return text + "\n";
 }
