@@ -114,8 +114,8 @@ TEST_F(LiveCommand, SavesItsMapOnSigtermWithinTwoSecondsAndOutlivesItsTerminal) 
 /// `pade live vehicle.yaml | head`, and a log that nobody reads any more: both would end or hold up the
 /// flight.
 TEST_F(LiveCommand, OutlivesWhoeverReadsItsLog) {
+  record(200);
   for (const bool closed : {true, false}) {
-    record(15);
     int log[2];
     ASSERT_EQ(::pipe2(log, O_CLOEXEC), 0);
     if (closed) {
@@ -133,15 +133,24 @@ TEST_F(LiveCommand, OutlivesWhoeverReadsItsLog) {
     const pid_t session = start(config(map_line() + more), log[1]);
     ::close(log[1]);
     int status = -1;
-    const Time begun = now_of_ours();
-    while (::waitpid(session, &status, WNOHANG) == 0) {
-      if (fs::exists(folder_ / "map.bt")) {  // all that is left is to say so
-        if (!closed) ::close(log[0]);
-        ::waitpid(session, &status, 0);
-        break;
+    bool ended = false;
+    const auto wait_for = [&](const auto& condition) {
+      constexpr double kPatience = 25;  // s
+      const Time begun = now_of_ours();
+      while (!ended && !condition() && seconds_between(begun, now_of_ours()) < kPatience) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        ended = ::waitpid(session, &status, WNOHANG) != 0;
       }
-      if (seconds_between(begun, now_of_ours()) > 30) ::kill(session, SIGKILL);
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    };
+    wait_for([&] { return autopilot.sectors().size() >= 3; });
+    EXPECT_GE(autopilot.sectors().size(), 3U);
+    if (!ended) ::kill(session, SIGTERM);
+    wait_for([&] { return fs::exists(folder_ / "map.bt"); });  // all that is left is to say so
+    if (!closed) ::close(log[0]);
+    wait_for([] { return false; });
+    if (!ended) {
+      ::kill(session, SIGKILL);
+      ::waitpid(session, &status, 0);
     }
     EXPECT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
     EXPECT_TRUE(fs::exists(folder_ / "map.bt"));

@@ -255,7 +255,7 @@ TEST(Session, FarFromTheOriginOfThePosesTheMapHasOneOfItsOwn) {
   ASSERT_TRUE(recorder) << recorder.error().message;
   Bed bed(10, recorder->get());
   bed.poses.start = {0, -40'000, 120};
-  const auto& counts = bed.run(1.2, [](double) {});
+  const auto& counts = bed.run(2, [](double) {});
   EXPECT_EQ(counts.restarts, 0U);
   EXPECT_EQ(counts.outside, 0U);
   EXPECT_NEAR(bed.session->origin().y(), -40'000, 1);
