@@ -1,0 +1,94 @@
+// Flights that do not go on as they were: the camera stops, hangs or brakes.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "pade/pipeline/obstacle_mapper.hpp"
+#include "pade/simulation/analytic/analytic_flights.hpp"
+#include "pade/simulation/analytic/analytic_render.hpp"
+
+namespace pade {
+namespace {
+
+/// A flight forward in small images with noise.
+class ForwardCamera {
+ public:
+  ForwardCamera()
+      : scene_(*simulation::make_analytic_flight("forward", 7, simulation::analytic_camera(160, 120))),
+        mapper_(std::move(ObstacleMapper::create(scene_.camera)).value()) {}
+
+  [[nodiscard]] const simulation::AnalyticFlight& scene() const { return scene_; }
+  [[nodiscard]] std::size_t size() const { return scene_.T_world_camera.size(); }
+  [[nodiscard]] ObstacleMapper& mapper() { return mapper_; }
+  [[nodiscard]] cv::Mat image(const Pose& pose) {
+    cv::Mat noise(scene_.camera.size(), CV_16SC1);
+    random_.fill(noise, cv::RNG::NORMAL, 0, 1);
+    cv::Mat image;
+    cv::add(simulation::render_image(scene_.scene, scene_.camera, pose), noise, image, {}, CV_8U);
+    return image;
+  }
+  /// The next frame, a tenth of a second after the one before.
+  const MapperUpdate& add(const cv::Mat& image, const Pose& pose) {
+    time_.nanoseconds += 100000000;
+    return mapper_.add(image, time_, pose);
+  }
+  const MapperUpdate& add(const Pose& pose) { return add(image(pose), pose); }
+
+ private:
+  simulation::AnalyticFlight scene_;
+  ObstacleMapper mapper_;
+  cv::RNG random_{5};
+  Time time_;
+};
+
+/// Share of the pixels that have a depth, and the median of its relative error.
+struct Quality {
+  double share = 0, error = 1;
+};
+Quality quality(const DepthImage& depth, const simulation::AnalyticFlight& f, const Pose& pose) {
+  Quality q;
+  if (depth.empty()) return q;
+  const cv::Mat truth = simulation::exact_depth(f.scene, f.camera, pose);
+  std::vector<float> errors;
+  for (int v = 0; v < truth.rows; ++v) {
+    for (int u = 0; u < truth.cols; ++u) {
+      const float error = depth.depth.at<float>(v, u) / truth.at<float>(v, u) - 1;
+      if (std::isfinite(error)) errors.push_back(std::abs(error));
+    }
+  }
+  q.share = static_cast<double>(errors.size()) / static_cast<double>(truth.total());
+  if (errors.empty()) return q;
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  q.error = static_cast<double>(*middle);
+  return q;
+}
+
+/// The views of before are still there: what they have measured does not go with the parallax of the last
+/// pair.
+TEST(UnevenFlight, DepthOutlivesAStandstillAndACreep) {
+  for (const double step : {0.0, 0.001}) {
+    ForwardCamera f;
+    Pose pose;
+    Quality before;
+    for (std::size_t k = 0; k < f.size(); ++k) {
+      pose = f.scene().T_world_camera[k];
+      before = quality(f.add(pose).depth, f.scene(), pose);
+    }
+    ASSERT_GT(before.share, 0.5);
+    for (int i = 1; i <= 3; ++i) {
+      pose.translation.y() += i % 2 == 0 ? step : -step;
+      const MapperUpdate& update = f.add(pose);
+      ASSERT_GT(update.views, 1);
+      const Quality now = quality(update.depth, f.scene(), pose);
+      EXPECT_GT(now.share, 0.85 * before.share) << step << ", frame " << i;
+      EXPECT_LT(now.error, 1.3 * before.error) << step << ", frame " << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace pade
