@@ -90,5 +90,39 @@ TEST(UnevenFlight, DepthOutlivesAStandstillAndACreep) {
   }
 }
 
+/// Each step of a frozen image is shorter than what is taken for a motion; together they are not.
+TEST(UnevenFlight, ACameraThatHangsInSlowFlightIsNotBelieved) {
+  for (const double turn : {0.0, 0.0004}) {
+    const double step = turn > 0 ? 0.0 : 0.002;
+    ForwardCamera f;
+    Pose pose = f.scene().T_world_camera[0];
+    f.add(pose);
+    pose = f.scene().T_world_camera[1];
+    const cv::Mat frozen = f.image(pose);
+    f.add(frozen, pose);
+    const std::size_t free = f.mapper().map().counts().free;
+    for (int i = 1; i <= 40; ++i) {
+      pose.translation.x() += step;
+      pose.rotation = (pose.rotation * rotation_exp({0, turn, 0})).normalized();
+      const MapperUpdate& update = f.add(frozen, pose);
+      EXPECT_EQ(update.outcome == MapperUpdate::Outcome::skipped, i > 2) << i << ": " << update.reason;
+    }
+    EXPECT_LE(f.mapper().map().counts().free, free + free / 10);
+    EXPECT_EQ(f.add(pose).outcome, MapperUpdate::Outcome::mapped);  // it has come back
+  }
+}
+
+/// A vehicle that stands before a wall, in a simulator without noise, has one image for ever.
+TEST(UnevenFlight, ACameraThatStandsDoesNotHang) {
+  ForwardCamera f;
+  const Pose pose = f.scene().T_world_camera[0];
+  const cv::Mat image = f.image(pose);
+  for (int i = 0; i < 20; ++i) {
+    Pose given = pose;
+    given.translation.x() += i % 2 == 0 ? 0.0 : 0.004;
+    EXPECT_NE(f.add(image, given).outcome, MapperUpdate::Outcome::skipped) << i;
+  }
+}
+
 }  // namespace
 }  // namespace pade

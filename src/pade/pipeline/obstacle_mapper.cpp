@@ -52,11 +52,12 @@ Status check(const Camera& camera, const ObstacleMapperOptions& options, const c
 
 /// The motion that the poses as given tell, with its covariance. Over several frames the error is that of a
 /// velocity: it grows with their number.
-/// @param older, newer  poses. @param covariance  of the last of the `step` motions, older frame as reference
+/// @param older, newer  poses. @param covariances  sum of those of the `step` motions, older frame as
+/// reference
 RelativeMotion motion_between(const Pose& older, const Pose& newer, double duration,
-                              const Matrix6d& covariance, int step, Order order) {
+                              const Matrix6d& covariances, int step, Order order) {
   RelativeMotion forward = relative_motion(older, newer, duration);
-  forward.covariance = step * step * covariance;
+  forward.covariance = step * covariances;
   return order == Order::newest ? reversed(forward) : forward;
 }
 
@@ -77,18 +78,19 @@ bool many_views(const ObstacleMapperOptions& o) {
   return o.views.count > 0 && two_baselines(o) && o.depth.window == 1 && o.depth.gates == depth::Gates::on;
 }
 
-/// The pose has moved, the image is the same.
-bool hangs(const TrackedFrame& newest, const TrackedFrame& last) {
-  constexpr double kMoved = 0.005;   // m
-  constexpr double kTurned = 0.001;  // rad
-  const Pose motion = last.given.inverse() * newest.given;
-  if (motion.translation.norm() < kMoved && rotation_log(motion.rotation).norm() < kTurned) return false;
-  const cv::Mat& a = newest.frame.image;
-  const cv::Mat& b = last.frame.image;
+bool is_same(const cv::Mat& a, const cv::Mat& b) {
   for (int v = 0; v < a.rows; ++v) {
     if (std::memcmp(a.ptr(v), b.ptr(v), static_cast<std::size_t>(a.cols)) != 0) return false;
   }
   return true;
+}
+
+/// The pose has moved since the image was new, however slowly.
+bool hangs(const TrackedFrame& newest) {
+  constexpr double kMoved = 0.005;   // m
+  constexpr double kTurned = 0.001;  // rad
+  const Pose motion = newest.since.inverse() * newest.given;
+  return motion.translation.norm() >= kMoved || rotation_log(motion.rotation).norm() >= kTurned;
 }
 
 constexpr int kGuidedLevel = 1;  // flow over the longer baseline starts near its end
@@ -163,13 +165,16 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     return update_;
   }
 
-  TrackedFrame newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera};
+  TrackedFrame newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera, T_world_camera};
   newest.rate = rate;
   {
     const Stopwatch watch(update_, Stage::grey);
     newest.frame.image = to_grey(image);
   }
-  if (!recent_.empty() && hangs(newest, recent_.last())) {
+  if (!recent_.empty() && is_same(newest.frame.image, recent_.last().frame.image)) {
+    newest.since = recent_.last().since;
+  }
+  if (hangs(newest)) {
     update_.reason = "the camera has moved, but the image is that of before to the last bit: it hangs";
     update_.outcome = MapperUpdate::Outcome::skipped;
     update_.change = map_.forget(time);
@@ -211,9 +216,11 @@ void ObstacleMapper::map_frame(TrackedFrame& newest) {
 
   // Relative translation and rotation (Section 2.2), optical flow (Section 2.1), and what the images say of
   // the motion.
+  Matrix6d covariances = newest.frame.motion_covariance;
+  for (int i = 1; i < options_.step; ++i) covariances += recent_.before(i).frame.motion_covariance;
   const RelativeMotion prior =
       motion_between(older.given, newest.given, seconds_between(older.frame.time, newest.frame.time),
-                     newest.frame.motion_covariance, options_.step, options_.order);
+                     covariances, options_.step, options_.order);
   cv::Mat foretold;
   {
     const Stopwatch watch(update_, Stage::flow);
@@ -224,6 +231,7 @@ void ObstacleMapper::map_frame(TrackedFrame& newest) {
   refine(pair, newest, reference);
   if (many_views(options_)) refine_by_depth(prior, pair, newest.frame);
   place(newest, older);
+  newest.motion = pair.motion;
 
   // Average optical flow and calculate the depth image (Section 2.3).
   estimate_depth(pair, reference, prior.R_reference_other, update_.depth);
@@ -326,7 +334,7 @@ RelativeMotion ObstacleMapper::motion_to(const Frame& newest, const Pair& pair, 
   const Frame& other = recent_.before(frames).frame;
   RelativeMotion motion =
       relative_motion(newest.T_world_camera, other.T_world_camera, seconds_between(newest.time, other.time));
-  motion.covariance = over_several(pair.motion, (frames + options_.step - 1) / options_.step);
+  motion.covariance = recent_.covariance(newest, pair.motion, frames, options_.step);
   return motion;
 }
 
