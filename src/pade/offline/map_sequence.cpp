@@ -47,6 +47,17 @@ double masked_share(const cv::Mat& mask) {
   return 1 - static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
 }
 
+/// What stands on what is judged along +z of the world of the poses.
+Status check_footing(const io::Sequence& sequence, const depth::FootingOptions& footing) {
+  constexpr double kAgrees = 0.999;
+  const auto& up = sequence.world_up();
+  if (!footing.on || (up && up->direction.z() > kAgrees)) return {};
+  return Error{
+      fmt::format("footing.on: needs poses in a world whose up is +z; found {}; leave it off, or state "
+                  "the true up with --world-up or world_up in camera.yaml",
+                  up ? io::to_text(up->direction) + " (" + up->source + ")" : "no common up")};
+}
+
 /// For images that have none yet.
 Result<io::ComputedPoses> no_poses(const std::filesystem::path& /*folder*/, const std::vector<Time>& images,
                                    const io::Calibration& /*calibration*/) {
@@ -328,6 +339,7 @@ Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOp
                                const std::function<bool(const MapProgress&)>& progress,
                                std::chrono::steady_clock::time_point started) {
   if (const Status status = check(options); !status) return status.error();
+  if (const Status status = check_footing(sequence, options.mapper.footing); !status) return status.error();
   auto mapper = ObstacleMapper::create(sequence.camera(), options.mapper, sequence.mask());
   if (!mapper) return mapper.error();
 
