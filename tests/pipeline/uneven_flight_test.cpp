@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "pade/pipeline/obstacle_mapper.hpp"
 #include "pade/simulation/analytic/analytic_flights.hpp"
@@ -121,6 +122,54 @@ TEST(UnevenFlight, ACameraThatStandsDoesNotHang) {
     Pose given = pose;
     given.translation.x() += i % 2 == 0 ? 0.0 : 0.004;
     EXPECT_NE(f.add(image, given).outcome, MapperUpdate::Outcome::skipped) << i;
+  }
+}
+
+/// Automatic exposure that drifts: the views are compared at one exposure.
+TEST(UnevenFlight, ASlowChangeOfExposureCostsNoPrecision) {
+  const auto fly = [](double per_frame) {
+    ForwardCamera f;
+    Quality last;
+    double gain = 0.8;
+    for (const Pose& pose : f.scene().T_world_camera) {
+      cv::Mat image;
+      f.image(pose).convertTo(image, CV_8U, gain);
+      last = quality(f.add(image, pose).depth, f.scene(), pose);
+      gain *= per_frame;
+    }
+    return last;
+  };
+  const Quality constant = fly(1);
+  const Quality drifting = fly(1.04);
+  EXPECT_LT(drifting.error, 1.3 * constant.error);
+  EXPECT_GT(drifting.share, 0.9 * constant.share);
+}
+
+/// The border of a mask stands still in the image, as a thing infinitely far would; the scene before it does
+/// not become free for that.
+TEST(UnevenFlight, NothingIsFarAtTheBorderOfAMask) {
+  ForwardCamera scene;
+  const simulation::AnalyticFlight& f = scene.scene();
+  cv::Mat valid(f.camera.size(), CV_8UC1, cv::Scalar(0));
+  cv::circle(valid, {80, 60}, 52, 255, -1);
+  auto mapper = std::move(ObstacleMapper::create(f.camera, {}, valid)).value();
+  Pose pose = f.T_world_camera[0];
+  const Eigen::Vector3d aside = pose.rotation * Eigen::Vector3d(0.15, 0, 0);
+  Time time;
+  for (int i = 0; i < 8; ++i) {
+    pose.translation += aside;
+    time.nanoseconds += 100000000;
+    cv::Mat image = scene.image(pose);
+    image.setTo(0, valid == 0);
+    const MapperUpdate& update = mapper.add(image, time, pose);
+    if (i < 7) continue;
+    const cv::Mat truth = simulation::exact_depth(f.scene, f.camera, pose);
+    const cv::Mat too_far = (update.depth.bound > truth * 1.2) & (truth > 0);
+    cv::Mat inner;
+    cv::erode(valid, inner, cv::Mat::ones(21, 21, CV_8UC1));
+    EXPECT_EQ(cv::countNonZero(too_far & (inner == 0)), 0);
+    EXPECT_GT(cv::countNonZero((update.depth.bound > 0) & inner), cv::countNonZero(inner) / 2);
+    EXPECT_EQ(cv::countNonZero((update.depth.bound > 0) & (valid == 0)), 0);
   }
 }
 

@@ -11,6 +11,7 @@
 #include "pade/core/option_check.hpp"
 #include "pade/depth/derotation.hpp"
 #include "pade/depth/image/outlines.hpp"
+#include "pade/depth/multi_view/exposure.hpp"
 #include "pade/depth/pair_fusion.hpp"
 #include "pade/depth/prediction.hpp"
 #include "pade/flow/methods/clg.hpp"
@@ -83,6 +84,15 @@ bool is_same(const cv::Mat& a, const cv::Mat& b) {
     if (std::memcmp(a.ptr(v), b.ptr(v), static_cast<std::size_t>(a.cols)) != 0) return false;
   }
   return true;
+}
+
+/// The border of a mask stands still in the image, as a thing infinitely far would: no window that judges a
+/// match, with the gradients in it, may see it.
+cv::Mat clear_of_border(const cv::Mat& valid) {
+  constexpr int kReach = 4;  // px
+  cv::Mat clear;
+  if (!valid.empty()) cv::erode(valid, clear, cv::Mat::ones(2 * kReach + 1, 2 * kReach + 1, CV_8UC1));
+  return clear;
 }
 
 /// The pose has moved since the image was new, however slowly.
@@ -366,8 +376,11 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   }
   const cv::Mat start = depth::start_of_views(update_.depth, pair.flow.vectors, camera_, pair.motion,
                                               newest.T_world_camera, found_, baseline, options_.views.depth);
-  const ParallaxField& field =
-      views_.estimate(newest.image, views, start * scale, update_.diagnostics.image_noise);
+  const cv::Mat d = start * scale;
+  for (flow::View& view : views) {
+    view.image = depth::at_exposure_of(newest.image, view.image, d, view.H, view.e, valid_);
+  }
+  const ParallaxField& field = views_.estimate(newest.image, views, d, update_.diagnostics.image_noise);
   const depth::CommonError common(camera_, motions, options_.views.flow.largest_parallax);
   depth::read_views(field, scale, common, options_.depth, options_.views.depth, update_.depth);
   found_ = {newest.T_world_camera, field.distance * (1 / scale)};
@@ -380,8 +393,9 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
 void ObstacleMapper::estimate_depth(const Pair& pair, const Frame& reference,
                                     const std::optional<Eigen::Matrix3d>& removed, DepthImage& out) {
   const Stopwatch watch(update_, Stage::depth);
+  const cv::Mat valid = clear_of_border(valid_);
   depth::DepthInput input{camera_,         pair.motion, pair.flow, options_.derotation,
-                          reference.image, pair.seen,   valid_};
+                          reference.image, pair.seen,   valid};
   const bool refined = update_.refinement.outcome == depth::RefinementOutcome::refined;
   if (refined && removed) input.rotation_removed = *removed;
   if (!removed) input.texture = depth_.gate();  // of the first pair: the same image, and much the same lines
