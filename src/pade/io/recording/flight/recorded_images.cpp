@@ -226,6 +226,17 @@ Result<cv::Mat> pixels_of(const ImageMessage& image) {
   return pixels;
 }
 
+Result<cv::Mat> pixels_of(const CompressedImageMessage& image) {
+  auto stored = read_image_bytes(image.data, fmt::format("an image of {} bytes", image.data.size()));
+  const std::string_view inside = encoding_inside(image.format);
+  if (!stored || stored->channels() != 1 || !inside.starts_with("bayer_")) return stored;
+  const PixelEncoding* const mosaic = pixel_encoding(inside);
+  if (mosaic == nullptr || stored->depth() != CV_8U)
+    return Error{fmt::format("found {} bits of the encoding {}, expected 8 of bayer_*8",
+                             8 * stored->elemSize1(), in_quotes(inside))};
+  return converted(*stored, *mosaic);
+}
+
 bool is_camera_topic(const Recording& recording, const Topic& topic) {
   const auto encoding = message_encoding(topic.encoding);
   if (!encoding || topic.messages.empty()) return false;

@@ -36,6 +36,8 @@ bool is_camera_topic(const Recording& recording, const Topic& topic);
 /// The pixels of a message: 8 or 16 bit, grey or BGR. Error for an encoding that is not understood, or fewer
 /// bytes than its rows need.
 Result<cv::Mat> pixels_of(const ImageMessage& image);
+/// The same of a PNG or JPEG; a Bayer mosaic in it becomes colours.
+Result<cv::Mat> pixels_of(const CompressedImageMessage& image);
 
 /// When the messages of a topic were made: by their headers. Where most headers say nothing, when they were
 /// recorded; where a few do, those are empty and to be left out: both with a note. Errors: the topic is
