@@ -73,6 +73,7 @@ void AutopilotLink::step(Time now, const Progress& progress) {
   }
   report_.in = parser_.counts();
   refresh_report(now);
+  if (is_alone()) return send_health(now, progress);
   if (!report_.autopilot) return;
   ask(now);
   send_sectors(now);
@@ -169,8 +170,19 @@ bool AutopilotLink::in_faces() const {
          report_.autopilot->kind == ardupilot_kind;
 }
 
+std::optional<Time> AutopilotLink::time_of_poses(Time ours) const {
+  return poses_->in_our_time() ? ours : clock_.to_autopilot(ours);
+}
+
+/// By our clock; empty: there is none.
+std::optional<Time> AutopilotLink::newest_pose() const {
+  const Time newest = poses_->newest();
+  if (newest.nanoseconds == 0) return std::nullopt;
+  return poses_->in_our_time() ? newest : clock_.to_ours(newest);
+}
+
 std::optional<Time> AutopilotLink::offered_pose_time() const {
-  return clock_.to_autopilot(later(offered_frame_, offered_ ? offered_->time_offset : 0));
+  return time_of_poses(later(offered_frame_, offered_ ? offered_->time_offset : 0));
 }
 
 bool AutopilotLink::send_level() {
@@ -216,14 +228,13 @@ void AutopilotLink::send_sectors(Time now) {
 /// pilot can take.
 void AutopilotLink::send_health(Time now, const Progress& progress) {
   constexpr double kBetweenHeartbeats = 0.1, kBetweenTexts = 1;  // s
-  const auto newest = clock_.to_ours(poses_->newest());
-  const bool any = poses_->newest().nanoseconds != 0 && newest.has_value();
-  progress_.synchronised = clock_.synchronised(now);
-  progress_.pose = any ? newest->nanoseconds : 0;
+  progress_.synchronised = poses_->in_our_time() || clock_.synchronised(now);
+  progress_.pose = newest_pose().value_or(Time{}).nanoseconds;
   const Missing missing = missing_now(now, progress, progress_);
   const bool changed = missing != report_.missing;
   report_.missing = missing;
   report_.poses_missing = missing == Missing::pose ? poses_->missing() : std::string();
+  if (is_alone()) return;
   if (const std::string text = text_of(report_); said_ != text && now >= next_text_) {
     say(missing == Missing::nothing ? kInformation : kWarning, text);
     said_ = text;
@@ -254,14 +265,14 @@ void AutopilotLink::end() {
 
 PoseAnswer AutopilotLink::pose_at(Time time) const {
   const std::lock_guard lock(mutex_);
-  const auto theirs = clock_.to_autopilot(time);
+  const auto theirs = time_of_poses(time);
   return theirs ? poses_->at(*theirs) : PoseAnswer{};
 }
 
 std::optional<Matrix6d> AutopilotLink::motion_covariance(Time t1, Time t2, const Pose& T_body_camera) const {
   const std::lock_guard lock(mutex_);
-  const auto theirs1 = clock_.to_autopilot(t1);
-  const auto theirs2 = clock_.to_autopilot(t2);
+  const auto theirs1 = time_of_poses(t1);
+  const auto theirs2 = time_of_poses(t2);
   if (!theirs1 || !theirs2) return std::nullopt;
   return poses_->motion_covariance(*theirs1, *theirs2, T_body_camera);
 }
@@ -270,6 +281,7 @@ void AutopilotLink::offer(const FrameObstacles& obstacles, Time frame) {
   const std::lock_guard lock(mutex_);
   const bool says_anything = obstacles.level || (in_faces() && obstacles.points);
   offered_.reset();
+  if (is_alone()) return;  // nobody wants them, so none is missing
   if (says_anything) offered_ = obstacles;
   offered_frame_ = frame;
   (says_anything ? progress_.offered : progress_.empty) = frame.nanoseconds;

@@ -37,7 +37,7 @@ enum class ObstacleMessages : std::uint8_t {
 
 /// Options of AutopilotLink.
 struct LinkOptions {
-  std::string port = "udp:14540";                        ///< udp:PORT, or a serial device
+  std::string port = "udp:14540";                        ///< udp:PORT, a serial device, or none
   int baud = 921600;                                     ///< of a serial device
   PoseMessages poses = PoseMessages::estimate;           ///< where poses come from
   double pose_rate = 30;                                 ///< Hz that the autopilot is asked for
@@ -45,12 +45,12 @@ struct LinkOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("port", self.port, "udp:PORT, or a serial device such as /dev/ttyAMA0");
+    field("port", self.port, "udp:PORT, a serial device such as /dev/ttyAMA0, or none: no autopilot");
     field("baud", self.baud, "of a serial device");
     field(
         "poses", self.poses,
         "estimate: ATTITUDE_QUATERNION (else ATTITUDE) and LOCAL_POSITION_NED; odometry: ODOMETRY; sensors: "
-        "IMU, GNSS, magnetometer and barometer in our own filter");
+        "IMU, GNSS, magnetometer and barometer in our own filter; dds: a topic of ROS 2 (dds.poses)");
     field("pose_rate", self.pose_rate, "Hz that the autopilot is asked for");
     field("obstacles", self.obstacles,
           "level: OBSTACLE_DISTANCE; faces: OBSTACLE_DISTANCE_3D, which ArduPilot alone knows");
@@ -101,6 +101,9 @@ class AutopilotLink : public NavigationSource {
   /// @param navigator  of our own filter; both options such as check() accepts
   AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options,
                 const navigation::NavigatorOptions& navigator = {});
+  /// @param poses  where they come from instead
+  AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options, std::unique_ptr<PoseSource> poses)
+      : port_(std::move(port)), options_(options), poses_(std::move(poses)) {}
 
   /// Waits for bytes, at most so long, ms.
   void wait(int milliseconds) { port_->wait(milliseconds); }
@@ -128,7 +131,10 @@ class AutopilotLink : public NavigationSource {
   bool send_points();
   void turn_to_newest_heading(mavlink::ObstacleDistance& sectors) const;
   [[nodiscard]] bool in_faces() const;
-  /// Of the autopilot's clock, of the poses of the frame that is offered.
+  [[nodiscard]] bool is_alone() const { return options_.port == no_port; }
+  [[nodiscard]] std::optional<Time> time_of_poses(Time ours) const;
+  [[nodiscard]] std::optional<Time> newest_pose() const;
+  /// By the clock of the poses, of those of the frame that is offered.
   [[nodiscard]] std::optional<Time> offered_pose_time() const;
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/live/link/bracket.hpp"
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
 
@@ -17,8 +18,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using mavlink::unpack;
 
-constexpr double kKept = 3;              // s
-constexpr double kFarthestApart = 0.25;  // s
+constexpr double kKept = 3;  // s
 
 Time since_start(std::uint32_t ms) { return {static_cast<std::int64_t>(ms) * 1'000'000}; }
 
@@ -32,29 +32,6 @@ Vector3d vector(float x, float y, float z) { return Eigen::Vector3f(x, y, z).cas
 Quaterniond from_angles(double roll, double pitch, double yaw) {
   return Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Vector3d::UnitY()) *
          Eigen::AngleAxisd(roll, Vector3d::UnitX());
-}
-
-/// Where a time lies among samples.
-struct Bracket {
-  PoseAnswer::Kind kind = PoseAnswer::Kind::not_yet;
-  std::size_t after = 0;  ///< index of the sample at or behind the time
-  double share = 0;       ///< of the way to it from the one before
-  std::string_view why;
-};
-
-template <class Samples>
-Bracket bracket(const Samples& samples, Time time) {
-  using Kind = PoseAnswer::Kind;
-  if (samples.empty() || samples.back().time < time) return {};
-  const auto after =
-      std::find_if(samples.begin(), samples.end(), [&](const auto& sample) { return sample.time >= time; });
-  const auto index = static_cast<std::size_t>(after - samples.begin());
-  if (after->time == time) return {Kind::valid, index, 1, {}};
-  if (index == 0) return {Kind::never, 0, 0, "the image is older than the poses"};
-  const auto& before = samples[index - 1];
-  const double gap = seconds_between(before.time, after->time);
-  if (gap > kFarthestApart) return {Kind::never, 0, 0, "a gap in the poses"};
-  return {Kind::valid, index, seconds_between(before.time, time) / gap, {}};
 }
 
 }  // namespace
@@ -86,7 +63,7 @@ void AutopilotPoses::add_attitude(Time time, const Quaterniond& q_ned_frd, doubl
     constexpr double kUnsaid = 0.15;  // rad
     const double dt = seconds_between(attitudes_.back().time, time);
     const double most = std::max(rate_, rate) * dt + kUnsaid;  // NaN: compares as false
-    if (dt > 0 && dt <= kFarthestApart && attitudes_.back().value.angularDistance(turn) > most) jump();
+    if (dt > 0 && dt <= kFarthestPosesApart && attitudes_.back().value.angularDistance(turn) > most) jump();
   }
   if (!push(attitudes_, time, turn)) return;
   rate_ = rate;
@@ -102,7 +79,8 @@ void AutopilotPoses::add_position(Time time, const Vector3d& ned, const Vector3d
     constexpr double kUnsaidSpeed = 0.5;  // m/s
     const double dt = seconds_between(positions_.back().time, time);
     const Vector3d expected = positions_.back().value + dt / 2 * (velocity_ + velocity);
-    if (dt > 0 && dt <= kFarthestApart && (place - expected).norm() > kUnsaid + kUnsaidSpeed * dt) jump();
+    if (dt > 0 && dt <= kFarthestPosesApart && (place - expected).norm() > kUnsaid + kUnsaidSpeed * dt)
+      jump();
   }
   if (!push(positions_, time, place)) return;
   velocity_ = velocity;
