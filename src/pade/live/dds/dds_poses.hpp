@@ -51,7 +51,7 @@ class DdsPoses : public PoseSource {
     Pose pose;
   };
   void pull();
-  void take(std::string_view message);
+  void take(std::string_view bytes);
   [[nodiscard]] bool is_jump(const Sample& next) const;
   void jump();
   void refuse(std::string why);
