@@ -161,16 +161,23 @@ void Running::add(const Image& message) {
   {
     const std::lock_guard lock(mutex_);
     counts_.images.tick(now);
-    constexpr Stamp kBack = 1'000'000'000;
-    back = newest_ != std::numeric_limits<Stamp>::min() && message.stamp < newest_ - kBack;
+    constexpr Stamp kNone = std::numeric_limits<Stamp>::min();
+    const double by = newest_ == kNone ? 0 : seconds_between({message.stamp}, {newest_});
+    back = by > kClockWentBack;
     if (back) {
-      anew_ =
-          fmt::format("the time went back by {:.1f} s", static_cast<double>(newest_ - message.stamp) * 1e-9);
+      anew_ = fmt::format("the time went back by {:.1f} s", by);
       counts_.dropped += waiting_.size();
       waiting_.clear();
       newest_ = message.stamp;
     }
     newest_ = std::max(newest_, message.stamp);
+  }
+  if (back) {
+    poses_->clear_after({message.stamp});
+    transforms_.clear();
+  }
+  {
+    const std::lock_guard lock(mutex_);
     const bool all = options_.max_latency == 0;
     const std::size_t most = all ? kMostOfBags : static_cast<std::size_t>(options_.most_waiting);
     if (waiting_.size() >= most) {
@@ -179,10 +186,6 @@ void Running::add(const Image& message) {
       ++counts_.dropped;
     }
     waiting_.push_back({message, now});
-  }
-  if (back) {
-    poses_->clear();
-    transforms_.clear();
   }
   come_.notify_all();
 }

@@ -20,7 +20,6 @@ using pade::Time;
 
 constexpr double kKept = 10;             // s
 constexpr double kFarthestApart = 0.25;  // s, as `pade live` has it
-constexpr double kClockWentBack = 1;     // s
 
 /// nav_msgs/Odometry or geometry_msgs/PoseStamped.
 class TopicPoses : public PoseInput {
@@ -76,9 +75,9 @@ class TopicPoses : public PoseInput {
     return reply;
   }
 
-  void clear() override {
+  void clear_after(Time now) override {
     const std::lock_guard lock(mutex_);
-    samples_.clear();
+    if (!samples_.empty() && seconds_between(now, samples_.back().time) > kClockWentBack) samples_.clear();
   }
 
   std::string world() override {
@@ -206,7 +205,7 @@ class TransformPoses : public PoseInput {
     }
     return reply;
   }
-  void clear() override {}
+  void clear_after(Time /*now*/) override {}
   std::string world() override {
     return options_.world_frame.empty() ? "map" : frame_name(options_.world_frame);
   }

@@ -52,8 +52,8 @@ class PoseInput {
   virtual PoseReply at(pade::Time time, const std::string& camera_frame) = 0;
   /// Of the camera's motion between two times; empty where it is not known.
   virtual std::optional<pade::Matrix6d> covariance(pade::Time, pade::Time) { return std::nullopt; }
-  /// The time has jumped back.
-  virtual void clear() = 0;
+  /// The time has jumped back: what is much later is of before the jump.
+  virtual void clear_after(pade::Time now) = 0;
   /// The world's frame; empty until it is known.
   virtual std::string world() = 0;
   /// What came, what is missing; `now` in seconds of a steady clock.
@@ -63,6 +63,8 @@ class PoseInput {
 /// @param topics  for messages
 std::unique_ptr<PoseInput> make_pose_input(const NodeOptions& options, const Topics& topics,
                                            Transforms& transforms);
+
+inline constexpr double kClockWentBack = 1;  ///< where stamps do by more, s
 
 /// Seconds of a steady clock.
 double steady_seconds();

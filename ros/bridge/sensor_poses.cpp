@@ -40,7 +40,6 @@ class SensorPoses : public PoseInput {
       return;
     }
     const Time time{message.stamp};
-    constexpr double kClockWentBack = 1;  // s
     if (seconds_between(time, newest_imu_) > kClockWentBack) {
       begin_anew(
           fmt::format("the stamps of the IMU went back by {:.1f} s", seconds_between(time, newest_imu_)));
@@ -170,9 +169,9 @@ class SensorPoses : public PoseInput {
     return motion.motion.covariance;
   }
 
-  void clear() override {
+  void clear_after(Time now) override {
     const std::lock_guard lock(mutex_);
-    begin_anew("the time went back");
+    if (seconds_between(now, newest_imu_) > kClockWentBack) begin_anew("the time went back");
   }
 
   std::string world() override {
