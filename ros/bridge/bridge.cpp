@@ -11,6 +11,7 @@
 #include <limits>
 #include <mutex>
 #include <optional>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -242,8 +243,10 @@ void Running::say(Diagnosis::Level level, const std::string& text) {
 void Running::skip(const std::string& reason) {
   {
     const std::lock_guard lock(mutex_);
+    constexpr std::size_t kMostReasons = 30;  // in full; of further ones their kinds
     ++counts_.skipped;
-    ++counts_.reasons[reason];
+    const bool full = counts_.reasons.size() < kMostReasons || counts_.reasons.count(reason) > 0;
+    ++counts_.reasons[full ? reason : kind_of(reason)];
   }
   say(Diagnosis::warning, fmt::format("frames are skipped: {}", reason));
 }
