@@ -59,6 +59,7 @@ Result<cv::Mat> pixels_of(const ImageMessage& image);
 Result<cv::Mat> pixels_of(const CompressedImageMessage& image);
 
 /// The camera of a calibration, with its lens.
+/// @param info  calibration of the images as they are
 /// @param rectified  the images are those after rectification: P is their camera, and there is no lens.
 /// Error where the calibration does not hold for whole images, turns them, or was never made.
 Result<Camera> camera_of(const CameraInfoMessage& info, bool rectified);
