@@ -18,6 +18,7 @@ set(pade_public_headers
   core/pose.hpp
   core/result.hpp
   core/sensors/measurements.hpp
+  core/sensors/navigation_log.hpp
   core/time.hpp
   navigation/camera/camera_motion.hpp
   navigation/filter_options.hpp
@@ -41,6 +42,9 @@ set(pade_public_headers
   mapping/query/map_view.hpp
   io/atomic_output.hpp
   io/formats/map_files.hpp
+  io/navigation/geodetic_fixes.hpp
+  io/options_json.hpp
+  io/recording/messages/image_messages.hpp
   io/world.hpp
   pipeline/obstacle_mapper.hpp
   pipeline/recent_frames.hpp)

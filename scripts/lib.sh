@@ -19,6 +19,7 @@ packages_build=(
 packages_test=(libgtest-dev libgmock-dev)
 packages_lint=(clang-format clang-tidy)
 packages_docs=(doxygen)
+packages_dds=(cyclonedds-dev libfastrtps-dev)  # topics of ROS 2 and the peer that they are tested with: for scripts/dds alone
 packages_python=(pybind11-dev python3-dev python3-numpy python3-build python3-venv mypy)  # for scripts/python alone
 
 assume_yes=false

@@ -26,6 +26,7 @@
 #include "pade/simulation/sdf/sdf_reader.hpp"
 #include "pade/simulation/world/world_solids.hpp"
 
+#include "options/json_text.hpp"
 #include "progress.hpp"
 
 namespace pade::cli {
@@ -299,7 +300,7 @@ Status evaluate_maps(const EvaluateMapArguments& arguments) {
                  to_table(*accuracy));
     }
   }
-  if (arguments.json) fmt::print("{}\n", (all.size() == 1 ? all[0] : all).dump(2));
+  if (arguments.json) fmt::print("{}\n", json_text(all.size() == 1 ? all[0] : all));
   return {};
 }
 

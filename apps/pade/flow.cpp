@@ -24,6 +24,7 @@ struct FlowArguments {
   std::string out;
   std::string picture;
   double full_scale = 0;
+  const CLI::Option* full_scale_given = nullptr;
 };
 
 void refuse(Context& context, const Error& error) {
@@ -31,7 +32,17 @@ void refuse(Context& context, const Error& error) {
   context.exit_code = 1;
 }
 
+Status check_picture(const FlowArguments& arguments) {
+  if (arguments.picture.empty() && arguments.full_scale_given->count() > 0)
+    return Error{"--full-scale: found it without --picture, expected both: alone it would do nothing"};
+  if (arguments.picture.empty() || cv::haveImageWriter(arguments.picture)) return {};
+  return Error{
+      fmt::format("--picture: found {}, expected the name of a picture that can be written: .png, .jpg ...",
+                  arguments.picture)};
+}
+
 Status compute(const FlowArguments& arguments) {
+  if (Status picture = check_picture(arguments); !picture) return picture;
   auto method = flow::make_flow_estimator(arguments.method);
   if (!method) return method.error();
   const auto first = read_grey(arguments.first);
@@ -70,8 +81,8 @@ void add_flow(CLI::App& app, Context& context) {
       ->capture_default_str();
   command->add_option("--out", arguments->out, "flow file to write: .flo, or .png in KITTI's 16-bit form");
   command->add_option("--picture", arguments->picture, "picture to write, in Middlebury's colours");
-  command->add_option("--full-scale", arguments->full_scale,
-                      "vector length of full colour, pixels (0 = automatic)");
+  arguments->full_scale_given = command->add_option("--full-scale", arguments->full_scale,
+                                                    "vector length of full colour, pixels (0 = automatic)");
 
   add_flow_evaluate(*command, context);
   command->callback([arguments, command, &context] {

@@ -109,8 +109,11 @@ Result<std::vector<LoadedPair>> load(const std::string& folder, const FlowEvalua
     return Error{fmt::format("{}\nnor a sequence with true depth: {}", pairs.error().message,
                              sequence.error().message)};
   }
-  const auto recorded = evaluation::recorded_pairs(*sequence, arguments.step, arguments.pairs);
+  std::vector<io::Skipped> skipped;
+  const auto recorded = evaluation::recorded_pairs(*sequence, arguments.step, arguments.pairs, &skipped);
   if (!recorded) return recorded.error();
+  for (const io::Skipped& one : skipped)
+    fmt::print(stderr, "pade flow: {}: skipped {}: {}\n", folder, one.file, one.reason);
   for (const evaluation::RecordedPair& pair : *recorded) {
     loaded.push_back({fmt::format("frame {}", pair.frame), pair.first, pair.second, pair.truth});
   }
@@ -236,9 +239,11 @@ void add_flow_evaluate(CLI::App& flow, Context& context) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
-      ->add_option("--confidence", arguments->confidence,
-                   "also judge sigma: error of the surest 70 % and by how much it is less, share of errors > "
-                   "3 px flagged, share of the others trusted, share of components within one sigma")
+      ->add_option(
+          "--confidence", arguments->confidence,
+          "also judge sigma: error of the surest 70 % and by how much it is less, share of errors > "
+          "3 px flagged, share of the others trusted, share of components within one sigma; - where a "
+          "method has no sigma")
       ->check(CLI::IsMember({"none", "local", "forward_backward"}))
       ->capture_default_str();
   command->add_flag("--mean", arguments->means_only, "only the mean over the pairs");

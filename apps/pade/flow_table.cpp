@@ -9,6 +9,8 @@
 
 #include "pade/core/compute/simd.hpp"
 
+#include "options/json_text.hpp"
+
 namespace pade::cli {
 namespace {
 
@@ -16,11 +18,41 @@ using evaluation::FlowAccuracy;
 using evaluation::FlowConfidenceAccuracy;
 using Json = nlohmann::ordered_json;
 
+// The mean over those that have a sigma; empty where none has.
+std::optional<FlowConfidenceAccuracy> mean_confidence(const std::vector<FlowScore>& pairs) {
+  FlowConfidenceAccuracy sum;
+  double n = 0;
+  double with_wrong_pixels = 0;
+  for (const FlowScore& pair : pairs) {
+    if (!pair.confidence) continue;
+    const FlowConfidenceAccuracy& c = *pair.confidence;
+    ++n;
+    sum.kept_endpoint_error += c.kept_endpoint_error;
+    sum.trusted += c.trusted;
+    sum.within += c.within;
+    if (!std::isnan(c.flagged)) {
+      sum.flagged += c.flagged;
+      ++with_wrong_pixels;
+    }
+    sum.remaining.resize(c.remaining.size());
+    sum.best_remaining.resize(c.best_remaining.size());
+    for (std::size_t i = 0; i < c.remaining.size(); ++i) {
+      sum.remaining[i] += c.remaining[i];
+      sum.best_remaining[i] += c.best_remaining[i];
+    }
+  }
+  if (n == 0) return std::nullopt;
+  for (double* part : {&sum.kept_endpoint_error, &sum.trusted, &sum.within}) *part /= n;
+  for (double& value : sum.remaining) value /= n;
+  for (double& value : sum.best_remaining) value /= n;
+  sum.flagged /= with_wrong_pixels;
+  return sum;
+}
+
 // Every pair counts alike, whatever its size.
 FlowScore mean(const std::vector<FlowScore>& pairs) {
-  FlowScore sum{.pair = "mean", .accuracy = {}, .confidence = {}};
+  FlowScore sum{.pair = "mean", .accuracy = {}, .confidence = mean_confidence(pairs)};
   const auto n = static_cast<double>(pairs.size());
-  double with_wrong_pixels = 0;
   for (const FlowScore& pair : pairs) {
     sum.accuracy.known += pair.accuracy.known;
     for (double FlowAccuracy::*part :
@@ -29,23 +61,7 @@ FlowScore mean(const std::vector<FlowScore>& pairs) {
           &FlowAccuracy::outliers}) {
       sum.accuracy.*part += pair.accuracy.*part / n;
     }
-    for (double FlowConfidenceAccuracy::*part :
-         {&FlowConfidenceAccuracy::kept_endpoint_error, &FlowConfidenceAccuracy::trusted,
-          &FlowConfidenceAccuracy::within}) {
-      sum.confidence.*part += pair.confidence.*part / n;
-    }
-    if (!std::isnan(pair.confidence.flagged)) {
-      sum.confidence.flagged += pair.confidence.flagged;
-      ++with_wrong_pixels;
-    }
-    sum.confidence.remaining.resize(pair.confidence.remaining.size());
-    sum.confidence.best_remaining.resize(pair.confidence.best_remaining.size());
-    for (std::size_t i = 0; i < pair.confidence.remaining.size(); ++i) {
-      sum.confidence.remaining[i] += pair.confidence.remaining[i] / n;
-      sum.confidence.best_remaining[i] += pair.confidence.best_remaining[i] / n;
-    }
   }
-  sum.confidence.flagged /= with_wrong_pixels;
   return sum;
 }
 
@@ -61,11 +77,13 @@ void print_head(const FlowTableOptions& options) {
 void print_row(std::string_view method, const FlowScore& score, const FlowTiming* timing,
                const FlowTableOptions& options) {
   const FlowAccuracy& a = score.accuracy;
-  const FlowConfidenceAccuracy& c = score.confidence;
   fmt::print("{:<18} {:<14} {:>7.3f} {:>7.2f} {:>6.1f} {:>6.1f} {:>6.1f} {:>6.1f} {:>6.1f}", method,
              score.pair, a.endpoint_error, a.angular_error, 100 * a.over_half, 100 * a.over_one,
              100 * a.over_three, 100 * a.outliers, 100 * a.coverage);
-  if (options.confident) {
+  if (options.confident && !score.confidence)
+    fmt::print(" {:>7} {:>6} {:>6} {:>6} {:>7}", "-", "-", "-", "-", "-");
+  if (options.confident && score.confidence) {
+    const FlowConfidenceAccuracy& c = *score.confidence;
     fmt::print(" {:>7.3f} {:>6.1f} {:>6.1f} {:>6.1f} {:>7.1f}", c.kept_endpoint_error,
                100 * (1 - c.kept_endpoint_error / a.endpoint_error), 100 * c.flagged, 100 * c.trusted,
                100 * c.within);
@@ -76,11 +94,13 @@ void print_row(std::string_view method, const FlowScore& score, const FlowTiming
 
 Json to_json(const FlowScore& score, const FlowTableOptions& options) {
   const FlowAccuracy& a = score.accuracy;
-  const FlowConfidenceAccuracy& c = score.confidence;
   Json json = {{"aee_px", a.endpoint_error}, {"aae_deg", a.angular_error}, {"r0.5", a.over_half},
                {"r1", a.over_one},           {"r3", a.over_three},         {"fl", a.outliers},
                {"coverage", a.coverage},     {"known_pixels", a.known}};
   if (!options.confident) return json;
+  json["confidence"] = nullptr;
+  if (!score.confidence) return json;
+  const FlowConfidenceAccuracy& c = *score.confidence;
   json["confidence"] = {{"aee_of_surest_70_percent", c.kept_endpoint_error},
                         {"flagged", c.flagged},
                         {"trusted", c.trusted},
@@ -123,7 +143,7 @@ void print_flow_json(const std::vector<FlowFolderScores>& folders, const FlowTab
       method["ratio_to_opencv_farneback"] = scores.timing.ratio;
     }
   }
-  fmt::print("{}\n", json.dump(2));
+  fmt::print("{}\n", json_text(json));
 }
 
 }  // namespace pade::cli

@@ -1,6 +1,7 @@
 // What `pade flow evaluate` prints: a table for people, or the same figures as JSON.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,7 @@ struct FlowTiming {
 struct FlowScore {
   std::string pair;
   evaluation::FlowAccuracy accuracy;
-  evaluation::FlowConfidenceAccuracy confidence;
+  std::optional<evaluation::FlowConfidenceAccuracy> confidence;  ///< empty: the method gave no sigma
 };
 
 /// One method on the pairs of one folder.

@@ -31,6 +31,9 @@
 #include "info/calibration_info.hpp"
 #include "info/info_lines.hpp"
 #include "info/recording_info.hpp"
+#include "info/sequence_set.hpp"
+#include "options/json_text.hpp"
+#include "options/unused_options.hpp"
 #include "plan/place_info.hpp"
 
 namespace pade::cli {
@@ -56,6 +59,7 @@ struct InfoArguments {
   int camera = 0;
   int step = 1;
   bool json = false;
+  const CLI::App* command = nullptr;
 };
 
 // "-y" where the direction is an axis.
@@ -72,18 +76,6 @@ Json json_of(const io::GeographicOrigin& origin) {
   return {{"latitude_deg", origin.latitude_deg},
           {"longitude_deg", origin.longitude_deg},
           {"height_m", origin.height}};
-}
-
-Json json_of(const SceneHardness& hardness) {
-  Json ranges = Json::array();
-  for (std::size_t i = 0; i < hardness.in_range.size(); ++i)
-    ranges.push_back({{"to_m", SceneHardness::ends[i]}, {"share", hardness.share(hardness.in_range[i])}});
-  return {{"pixels", hardness.pixels},
-          {"depth_ranges", std::move(ranges)},
-          {"beyond", hardness.share(hardness.beyond)},
-          {"low_gradient", hardness.share(hardness.flat)},
-          {"near_depth_edge", hardness.share(hardness.near_edge)},
-          {"nearest_m", hardness.nearest ? Json(*hardness.nearest) : Json()}};
 }
 
 std::string_view verdict_name(PoseCheck::Verdict verdict) {
@@ -200,63 +192,9 @@ void print_sequence(const io::Sequence& sequence, const SequenceCheck& check) {
   for (const io::Skipped& item : sequence.skipped()) line("skipped", "{}: {}", item.file, item.reason);
 }
 
-constexpr std::string_view kHardnessHead = "   0-4   4-8  8-12 12-16   >16 m   flat  edge  nearest m";
-
-void print_hardness(const SceneHardness& hardness) {
-  line("scene, %", "{}", kHardnessHead);
-  line("", "{}", to_line(hardness));
-  line("", "flat: gradient below {:g} grey levels per pixel; edge: within {} px of a depth edge",
-       SceneHardness::low_gradient, SceneHardness::edge_reach);
-}
-
-/// The sequences that lie in a folder, each with its scene, and all of them together.
-Status inform_of_set(const InfoArguments& arguments, const std::vector<io::Sequence>& sequences) {
-  SceneHardness total;
-  Json rows = Json::array();
-  std::string table;
-  for (const io::Sequence& sequence : sequences) {
-    const std::string name = sequence.folder().filename().string();
-    if (!sequence.has_truth()) {
-      table += fmt::format("  {:<18} {} frames, no true depth\n", name, sequence.size());
-      rows.push_back(
-          {{"folder", sequence.folder().string()}, {"frames", sequence.size()}, {"scene", nullptr}});
-      continue;
-    }
-    const Result<SceneHardness> hardness = evaluation::scene_hardness(sequence);
-    if (!hardness) return hardness.error();
-    total += *hardness;
-    table += fmt::format("  {:<18} {}\n", name, to_line(*hardness));
-    rows.push_back(
-        {{"folder", sequence.folder().string()}, {"frames", sequence.size()}, {"scene", json_of(*hardness)}});
-  }
-  if (arguments.json) {
-    const Json json = {{"kind", "sequences"}, {"sequences", std::move(rows)}, {"scene", json_of(total)}};
-    fmt::print("{}\n", json.dump(2));
-    return {};
-  }
-  fmt::print("{}: {} sequences; share of the pixels in %\n  {:<18} {}\n{}", arguments.path, sequences.size(),
-             "", kHardnessHead, table);
-  if (total.pixels > 0) fmt::print("  {:<18} {}\n", "together", to_line(total));
-  fmt::print("  flat: gradient below {:g} grey levels per pixel; edge: within {} px of a depth edge\n",
-             SceneHardness::low_gradient, SceneHardness::edge_reach);
-  return {};
-}
-
-/// Folders below `path` that are sequences, by name.
-std::vector<io::Sequence> sequences_in(const fs::path& path, const io::SequenceOptions& options) {
-  std::vector<fs::path> folders;
-  std::error_code code;
-  for (const auto& entry : fs::directory_iterator(path, code)) {
-    const bool hidden = entry.path().filename().string().starts_with(".");
-    if (entry.is_directory(code) && !hidden) folders.push_back(entry.path());
-  }
-  std::sort(folders.begin(), folders.end());
-  std::vector<io::Sequence> found;
-  for (const fs::path& folder : folders) {
-    auto sequence = io::Sequence::open(folder, options);
-    if (sequence) found.push_back(std::move(sequence).value());
-  }
-  return found;
+/// Refuses what does nothing for `what`.
+Status used_alone(const InfoArguments& arguments, const std::vector<std::string>& used, const char* what) {
+  return refuse_unused(*arguments.command, used, what);
 }
 
 Status inform_of_sequence(const InfoArguments& arguments) {
@@ -269,9 +207,18 @@ Status inform_of_sequence(const InfoArguments& arguments) {
   const Result<io::Sequence> sequence = io::Sequence::open(arguments.path, options);
   if (!sequence) {
     if (io::is_recording(arguments.path)) return sequence.error();
-    const std::vector<io::Sequence> below = sequences_in(arguments.path, options);
-    return below.empty() ? Status(sequence.error()) : inform_of_set(arguments, below);
+    const std::vector<FoundSequence> below = sequences_in(arguments.path, options);
+    const bool any =
+        std::any_of(below.begin(), below.end(), [](const auto& one) { return one.sequence.ok(); });
+    if (!any) return sequence.error();
+    const Status used = used_alone(
+        arguments, {"--poses", "--world-up", "--calibration", "--camera", "--json"}, "a folder of sequences");
+    return used ? inform_of_set(arguments.path, below, arguments.json) : used;
   }
+  const Status used = used_alone(
+      arguments, {"--poses", "--world-up", "--calibration", "--camera", "--topics", "--step", "--json"},
+      "a sequence");
+  if (!used) return used;
   const Result<SequenceCheck> check = evaluation::check_sequence(*sequence, arguments.step);
   if (!check) return check.error();
   std::optional<SceneHardness> hardness;
@@ -281,7 +228,7 @@ Status inform_of_sequence(const InfoArguments& arguments) {
   if (arguments.json) {
     Json json = json_of(*sequence, *check);
     json["scene"] = hardness ? json_of(*hardness) : Json();
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json_text(json));
     return {};
   }
   print_sequence(*sequence, *check);
@@ -290,6 +237,7 @@ Status inform_of_sequence(const InfoArguments& arguments) {
 }
 
 Status inform_of_map(const InfoArguments& arguments) {
+  if (Status used = used_alone(arguments, {"--at", "--json"}, "a map"); !used) return used;
   const auto made_with = io::options_beside(arguments.path);
   if (!made_with) return made_with.error();
   const Result<mapping::OccupancyMap> map = io::read_map(arguments.path, *made_with);
@@ -314,7 +262,7 @@ Status inform_of_map(const InfoArguments& arguments) {
     if (!bounds.isEmpty())
       json["bounds_m"] = {{"from", json_of(bounds.min())}, {"to", json_of(bounds.max())}};
     if (asked != nullptr) json["place"] = place_json(*map, Eigen::Vector3d(asked));
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json_text(json));
     return {};
   }
   fmt::print("{}: occupancy map with voxels of {:g} m\n", arguments.path, voxel);
@@ -371,6 +319,7 @@ void print_run(const io::Run& run, const std::optional<evaluation::DepthAccuracy
 }
 
 Status inform_of_run(const InfoArguments& arguments) {
+  if (Status used = used_alone(arguments, {"--json"}, "a run"); !used) return used;
   const Result<io::Run> run = io::read_run(arguments.path);
   if (!run) return run.error();
   const Result<std::optional<evaluation::DepthAccuracy>> accuracy = evaluation::stored_accuracy(*run);
@@ -385,7 +334,7 @@ Status inform_of_run(const InfoArguments& arguments) {
                {"timing", io::json_of(run->timing)},
                {"evaluation", nullptr}};
   if (*accuracy) json["evaluation"] = evaluation::json_of(**accuracy);
-  fmt::print("{}\n", json.dump(2));
+  fmt::print("{}\n", json_text(json));
   return {};
 }
 
@@ -399,6 +348,10 @@ Status inform(const InfoArguments& arguments) {
                     arguments.path)};
   }
   if (io::is_recording(path)) {
+    const Status used = used_alone(
+        arguments, {"--poses", "--world-up", "--calibration", "--camera", "--topics", "--step", "--json"},
+        "a recording");
+    if (!used) return used;
     const auto images = inform_of_ros_recording(path, arguments.topics, arguments.json);
     if (!images) return images.error();
     return *images ? inform_of_sequence(arguments) : Status();
@@ -409,12 +362,17 @@ Status inform(const InfoArguments& arguments) {
         fmt::format("{}: is no recording of ROS, expected one since topics are named", arguments.path)};
   }
   if (!fs::is_directory(path, code)) {
+    const bool log = live::is_tlog(path) || live::is_ulog(path);
+    const Status used = log ? used_alone(arguments, {"--json"}, "an autopilot's log") : Status();
+    if (!used) return used;
     if (live::is_tlog(path)) return inform_of_tlog(path, arguments.json);
     if (live::is_ulog(path)) return inform_of_ulog(path, arguments.json);
     if (const std::string advice = io::advice_for(path); !advice.empty())
       return Error{fmt::format("{}: cannot be read as what its name says{}", arguments.path, advice)};
     const bool map = path.extension() == ".bt" || path.extension() == ".ot";
-    return map ? inform_of_map(arguments) : inform_of_calibration(path, arguments.camera, arguments.json);
+    if (map) return inform_of_map(arguments);
+    const Status fits = used_alone(arguments, {"--camera", "--json"}, "a calibration");
+    return fits ? inform_of_calibration(path, arguments.camera, arguments.json) : fits;
   }
   if (!fs::exists(path / "run.json", code)) return inform_of_sequence(arguments);
   if (arguments.at.empty()) return inform_of_run(arguments);
@@ -429,6 +387,7 @@ void add_info(CLI::App& app, Context& context) {
   auto arguments = std::make_shared<InfoArguments>();
   CLI::App* command =
       app.add_subcommand("info", "Say what is in a sequence, a map or a run, and whether it is sane.");
+  arguments->command = command;
   command->footer(
       "Of a sequence: gaps in time, motion and parallax, which way is up, and whether the poses are in the "
       "convention\n"

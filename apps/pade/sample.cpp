@@ -1,11 +1,13 @@
 // `pade sample`: writes a flight through an analytic scene as a TUM RGB-D sequence with exact poses and
 // depth, so that everything can be tried without a download.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -19,6 +21,8 @@
 #include "pade/simulation/analytic/analytic_render.hpp"
 
 #include "commands.hpp"
+#include "options/json_text.hpp"
+#include "options/own_folder.hpp"
 #include "progress.hpp"
 
 namespace pade::cli {
@@ -26,6 +30,10 @@ namespace {
 
 constexpr double kDepthScale = 1000;  // counts per metre
 constexpr double kSensorNoise = 1.0;  // grey levels
+constexpr std::string_view kReadMe = "README.md";
+constexpr std::string_view kFirstWords = "A made-up flight (`pade sample";
+constexpr std::array<std::string_view, 7> kWritten = {
+    "rgb", "depth", "rgb.txt", "depth.txt", "groundtruth.txt", "camera.yaml", kReadMe};
 
 struct SampleArguments {
   std::string out;
@@ -67,13 +75,13 @@ std::string camera_yaml(const Camera& camera) {
 
 std::string read_me(const SampleArguments& arguments) {
   return fmt::format(
-      "A made-up flight (`pade sample --flight {} --frames {} --seed {}`) in the TUM RGB-D layout.\n\n"
+      "{} --flight {} --frames {} --seed {}`) in the TUM RGB-D layout.\n\n"
       "rgb/ 8-bit grey images at 10 Hz with {} grey level of sensor noise; depth/ exact depth Z of each "
       "pixel centre;\n"
       "groundtruth.txt exact camera poses (world ENU, metres; camera x right, y down, z forward).\n"
       "The scene is made of planes, boxes and balls, most of them textured; one wing of the building is "
       "blank.\n",
-      arguments.flight, arguments.frames, arguments.seed, kSensorNoise);
+      kFirstWords, arguments.flight, arguments.frames, arguments.seed, kSensorNoise);
 }
 
 Status write_frames(const simulation::AnalyticFlight& flight, const SampleArguments& arguments,
@@ -104,14 +112,17 @@ Status write_frames(const simulation::AnalyticFlight& flight, const SampleArgume
   if (Status s = folder.write("depth.txt", depths); !s) return s;
   if (Status s = folder.write("groundtruth.txt", io::format_trajectory(poses)); !s) return s;
   if (Status s = folder.write("camera.yaml", camera_yaml(flight.camera)); !s) return s;
-  return folder.write("README.md", read_me(arguments));
+  return folder.write(kReadMe, read_me(arguments));
 }
 
 Status write_sample(const SampleArguments& arguments) {
   const auto flight = simulation::make_analytic_flight(arguments.flight, arguments.frames);
   if (!flight) return flight.error();
+  if (arguments.force) {
+    if (Status own = check_own(arguments.out, {kReadMe, kFirstWords, kWritten}); !own) return own;
+  }
   auto folder = io::OutputFolder::create(
-      arguments.out, arguments.force ? io::Overwrite::replace : io::Overwrite::refuse, "groundtruth.txt");
+      arguments.out, arguments.force ? io::Overwrite::replace : io::Overwrite::refuse, kReadMe);
   if (!folder) return folder.error();
   if (Status s = write_frames(*flight, arguments, *folder); !s) return s;
   return folder->commit();
@@ -127,7 +138,7 @@ void run(const SampleArguments& arguments, Context& context) {
   if (arguments.json) {
     const nlohmann::ordered_json json = {
         {"out", arguments.out}, {"flight", arguments.flight}, {"frames", arguments.frames}};
-    fmt::print("{}\n", json.dump());
+    fmt::print("{}\n", json_text(json, -1));
   } else {
     fmt::print("{}: {} frames of the flight \"{}\" with exact poses and depth\n", arguments.out,
                arguments.frames, arguments.flight);
@@ -154,7 +165,7 @@ void add_sample(CLI::App& app, Context& context) {
   sample->add_option("--threads", arguments->threads, "the result does not depend on it")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
-  sample->add_flag("--force", arguments->force, "replace a flight that is there already");
+  sample->add_flag("--force", arguments->force, "replace a flight that this command wrote");
   sample->add_flag("--json", arguments->json, "print the result as JSON");
   sample->callback([arguments, &context] { run(*arguments, context); });
 }

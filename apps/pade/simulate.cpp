@@ -22,6 +22,7 @@
 #include "pade/simulation/generator/world_generator.hpp"
 #include "pade/simulation/sdf/sdf_reader.hpp"
 
+#include "options/unused_options.hpp"
 #include "progress.hpp"
 #endif
 
@@ -46,6 +47,7 @@ struct SimulateArguments {
   bool colour = false;
   bool quick = false;
   bool force = false;
+  const CLI::App* command = nullptr;
 };
 
 #ifdef PADE_HAS_SIMULATION
@@ -119,6 +121,48 @@ Status simulate_set(const SimulateArguments& arguments) {
   return {};
 }
 
+/// Refuses what would do nothing.
+Status check_use(const SimulateArguments& arguments) {
+  const CLI::App& command = *arguments.command;
+  const bool random = !arguments.random.empty();
+  if (!arguments.world.empty() && (random || !arguments.set.empty())) {
+    return Error{fmt::format("found the world {} and {}, expected one of them: it would do nothing",
+                             arguments.world, random ? "--random" : "--set")};
+  }
+  if (!random && !arguments.write_world.empty())
+    return Error{"--write-world: found it without --random, expected both: alone it would do nothing"};
+  std::vector<std::string> used = {"--out",     "--seed", "--preview", "--every",
+                                   "--threads", "--save", "--force",   "--samples"};
+  if (arguments.preview) used.pop_back();
+  const std::string beside = arguments.preview ? " and --preview" : "";
+  if (!arguments.set.empty()) {
+    for (const char* own : {"--set", "--quick"}) used.emplace_back(own);
+    return refuse_unused(command, used, "--set" + beside);
+  }
+  if (random && arguments.out.empty() && !arguments.write_world.empty()) {
+    return refuse_unused(command, {"--random", "--seed", "--density", "--write-world", "--force"},
+                         "--write-world alone, without --out");
+  }
+  for (const char* own : {"--flight", "--colour"}) used.emplace_back(own);
+  if (random) {
+    for (const char* own : {"--random", "--density", "--write-world"}) used.emplace_back(own);
+    return refuse_unused(command, used, "--random" + beside);
+  }
+  used.emplace_back("--resource-path");
+  if (arguments.world.empty()) return {};
+  return refuse_unused(command, used, "a world of a file" + beside);
+}
+
+fs::path cached_world(const SimulateArguments& arguments, const std::string& name) {
+  return default_cache() / "worlds" / name / (arguments.random + ".sdf");
+}
+
+/// Where the user wants it, with meshes of its own beside it.
+Status keep_world(const WorldFiles& files, const SimulateArguments& arguments) {
+  const fs::path file = arguments.write_world;
+  return write_world(with_own_meshes(files, file), file, sequence_options(arguments).overwrite);
+}
+
 /// A world without a lane: written and checked, then flown through if there is a flight.
 Status simulate_open_world(const SimulateArguments& arguments) {
   const auto kind = from_name<OpenWorldKind>(arguments.random);
@@ -128,16 +172,21 @@ Status simulate_open_world(const SimulateArguments& arguments) {
                     arguments.random)};
   if (arguments.write_world.empty() && (arguments.out.empty() || arguments.flight.empty()))
     return Error{"--density: found neither --write-world nor --flight with --out, expected one of them"};
-  const fs::path file = arguments.write_world.empty() ? default_cache() / "worlds" /
-                                                            fmt::format("{}-{}-{}", arguments.random,
-                                                                        arguments.seed, arguments.density) /
-                                                            (arguments.random + ".sdf")
-                                                      : fs::path(arguments.write_world);
-  const auto made = make_open_world(*kind, arguments.seed, arguments.density, file);
+  if (!arguments.out.empty() && arguments.flight.empty())
+    return Error{"--flight: found nothing, expected a flight file (docs/simulator.md)"};
+  // It is looked for in the cache: what the user named is written once, and only with a way through.
+  const fs::path cached =
+      cached_world(arguments, fmt::format("{}-{}-{}", arguments.random, arguments.seed, arguments.density));
+  const auto made = make_open_world(*kind, arguments.seed, arguments.density, cached);
   if (!made) return made.error();
-  fmt::print("{}: world {} of seed {}, from ({}, {}, {}) to ({}, {}, {}) m\n", file.string(),
-             made->attempt + 1, arguments.seed, made->start.x(), made->start.y(), made->start.z(),
-             made->goal.x(), made->goal.y(), made->goal.z());
+  if (!arguments.write_world.empty()) {
+    const OpenWorld world = generate_open_world(*kind, arguments.seed, arguments.density, made->attempt);
+    if (const Status s = keep_world(world.files, arguments); !s) return s;
+  }
+  fmt::print("{}: world {} of seed {}, from ({}, {}, {}) to ({}, {}, {}) m\n",
+             arguments.write_world.empty() ? cached.string() : arguments.write_world, made->attempt + 1,
+             arguments.seed, made->start.x(), made->start.y(), made->start.z(), made->goal.x(),
+             made->goal.y(), made->goal.z());
   if (arguments.out.empty()) return {};
   const auto flight = read_flight(arguments.flight);
   if (!flight) return flight.error();
@@ -150,6 +199,7 @@ Status simulate_open_world(const SimulateArguments& arguments) {
 }
 
 Status simulate(const SimulateArguments& arguments) {
+  if (const Status useful = check_use(arguments); !useful) return useful;
   if (arguments.density > 0) return simulate_open_world(arguments);
   if (!arguments.set.empty()) return simulate_set(arguments);
   std::optional<WorldKind> kind;
@@ -159,12 +209,12 @@ Status simulate(const SimulateArguments& arguments) {
     if (!kind)
       return Error{fmt::format("--random: found '{}', expected building, street, forest, rubble or corridor",
                                arguments.random)};
-    file = arguments.write_world.empty()
-               ? default_cache() / "worlds" / fmt::format("{}-{}", arguments.random, arguments.seed) /
-                     (arguments.random + ".sdf")
-               : fs::path(arguments.write_world);
-    if (const Status s = write_world(generate_world(*kind, arguments.seed), file); !s) return s;
-    if (!arguments.write_world.empty() && arguments.out.empty()) return {};
+    const WorldFiles made = generate_world(*kind, arguments.seed);
+    const bool keep = !arguments.write_world.empty();
+    file = keep ? fs::path(arguments.write_world)
+                : cached_world(arguments, fmt::format("{}-{}", arguments.random, arguments.seed));
+    if (const Status s = keep ? keep_world(made, arguments) : write_world(made, file); !s) return s;
+    if (keep && arguments.out.empty()) return {};
   }
   if (file.empty()) return Error{"no world: name an SDF file, --random KIND or --set paper"};
   if (arguments.out.empty()) return Error{"--out: found nothing, expected the folder of the new sequence"};
@@ -214,6 +264,7 @@ void add_simulate(CLI::App& app, Context& context) {
       "A run that was cut short goes on where it stopped. docs/simulator.md: how to write worlds and "
       "flights.");
   auto arguments = std::make_shared<SimulateArguments>();
+  arguments->command = command;
   command->add_option("world", arguments->world, "Gazebo world (SDF 1.0 to 1.9)");
   command->add_option("--flight", arguments->flight, "flight file (YAML)");
   command->add_option("--out,-o", arguments->out,
@@ -228,8 +279,10 @@ void add_simulate(CLI::App& app, Context& context) {
           "with --random forest, rubble, building-site or street: this many obstacles per hectare and no "
           "lane between start and goal, 60 m apart")
       ->check(CLI::Range(10.0, 2000.0));
-  command->add_option("--write-world", arguments->write_world,
-                      "write the random world to this SDF file (alone: without a flight)");
+  command->add_option(
+      "--write-world", arguments->write_world,
+      "write the random world to this SDF file, meshes of its name into meshes/ beside it (alone: without a "
+      "flight)");
   command->add_option("--set", arguments->set, "paper: the ten sequences, 1038 frames, of the experiments");
   command->add_flag("--quick", arguments->quick, "with --set: a tenth of the frames");
   command->add_option("--resource-path", arguments->resources, "folders with models, meshes and images");
@@ -247,7 +300,8 @@ void add_simulate(CLI::App& app, Context& context) {
   command->add_option("--threads", arguments->threads, "the result is the same for any number")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
-  command->add_flag("--force", arguments->force, "replace an existing sequence");
+  command->add_flag("--force", arguments->force,
+                    "replace an existing sequence, or a world that is there with another content");
   command->callback([arguments, &context] {
 #ifdef PADE_HAS_SIMULATION
     io::watch_for_interrupts();

@@ -81,6 +81,12 @@ cv::Mat image_of(py::handle array, std::string_view name, std::initializer_list<
         "numpy.ascontiguousarray() copies an array so",
         name, shape_text(numbers), std::string(py::str(numbers.attr("strides")))));
   }
+  if (!numbers.attr("flags").attr("aligned").cast<bool>()) {
+    throw py::type_error(fmt::format(
+        "{}: found elements that are not aligned in memory (strides {}), as in a view of a record; "
+        "numpy.array() copies an array so that they are",
+        name, std::string(py::str(numbers.attr("strides")))));
+  }
   // OpenCV has no constant headers; nothing here writes through one.
   void* const data = const_cast<void*>(numbers.data());  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   const std::size_t step =

@@ -53,6 +53,8 @@ class Depth {
       throw Refused("camera: found a lens with distortion, expected Camera.undistorted()");
     DepthInput_ images{optional_image(reference, "reference", {CV_8UC1}),
                        optional_image(other, "other", {CV_8UC1}), mask_of(valid, "valid")};
+    if (images.reference.empty() != images.other.empty())
+      throw Refused("reference, other: found one of them, expected both or none");
     same_size(flow.vectors, camera.size(), "flow");
     same_size(images.reference, camera.size(), "reference");
     same_size(images.other, camera.size(), "other");

@@ -51,7 +51,11 @@ Pose pose_from_quaternion(py::handle translation, py::handle quaternion) {
   if (!(std::abs(xyzw.norm() - 1) <= 1e-3)) {
     throw Refused(fmt::format("quaternion: found a norm of {}, expected 1 (to 1e-3)", xyzw.norm()));
   }
-  return {Eigen::Quaterniond(xyzw[3], xyzw[0], xyzw[1], xyzw[2]), vector_of(translation, "translation")};
+  // Rounded to a few digits it is no rotation yet: what it turns would grow or shrink.
+  Eigen::Quaterniond rotation(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
+  constexpr double kRounding = 1e-15;  // of doubles: kept as it is
+  if (!(std::abs(rotation.norm() - 1) <= kRounding)) rotation.normalize();
+  return {rotation, vector_of(translation, "translation")};
 }
 
 Eigen::Matrix4d matrix_of_pose(const Pose& pose) {

@@ -9,6 +9,7 @@
 
 #include "pade/mapping/query/distance_field.hpp"
 #include "pade/mapping/query/surroundings.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
 #include "convert.hpp"
 #include "handles.hpp"
@@ -18,6 +19,10 @@ namespace {
 
 using mapping::MapView;
 using mapping::UnknownSpace;
+
+std::string point_text(const Eigen::Vector3d& p) {
+  return fmt::format("({:g}, {:g}, {:g})", p.x(), p.y(), p.z());
+}
 
 Eigen::AlignedBox3d box_of(py::handle lowest, py::handle highest) {
   const Eigen::AlignedBox3d box(vector_of(lowest, "lowest"), vector_of(highest, "highest"));
@@ -52,6 +57,17 @@ void limited_box(const Eigen::AlignedBox3d& box, const MapView& view) {
 void limited_ball(double radius, const MapView& view) {
   positive(radius, "radius");
   limited(4.2 * radius * radius * radius, view, "radius");
+}
+
+/// What is counted voxel by voxel must be voxels: beyond what can be addressed there are none to count, and
+/// the answer would be that nothing is there.
+void addressed(const Eigen::AlignedBox3d& box, const MapView& view, std::string_view what) {
+  const double edge = mapping::kTreeCentre * view.voxel();
+  if (box.min().minCoeff() >= -edge && box.max().maxCoeff() < edge) return;
+  throw Refused(
+      fmt::format("{}: found {} to {}, expected what lies within {:g} m of 0 0 0 on each axis: voxels of "
+                  "{:g} m are addressed so far",
+                  what, point_text(box.min()), point_text(box.max()), edge, view.voxel()));
 }
 
 Eigen::Vector3d direction_of(py::handle object) {
@@ -123,6 +139,9 @@ py::array_t<double> sectors(const ViewHandle& handle, py::handle place, double r
         "place, below, above: found NaN, infinity or less than 0, expected a finite place and 0 m or more");
   }
   limited(4 * reach * reach * (below + above), *handle.view, "reach, below, above");
+  const Eigen::Vector3d around(reach, reach, 0);
+  addressed({at - around - below * Eigen::Vector3d::UnitZ(), at + around + above * Eigen::Vector3d::UnitZ()},
+            *handle.view, "place, reach, below, above");
   const UnknownSpace space = unknown_of(unknown);
   const auto distances =
       without_gil([&] { return mapping::sectors(*handle.view, at, reach, below, above, space); });
@@ -241,15 +260,21 @@ void add_view(py::module_& module) {
           [](const ViewHandle& v, const py::object& lowest, const py::object& highest) {
             const Eigen::AlignedBox3d box = box_of(lowest, highest);
             limited_box(box, *v.view);
+            addressed(box, *v.view, "lowest, highest");
             return dict_of_contents(without_gil([&] { return v.view->in_box(box); }));
           },
           py::arg("lowest"), py::arg("highest"),
-          "Voxels that a box touches: occupied, free, unknown, and the greatest probability of a known one.")
+          "Voxels that a box touches: occupied, free, unknown, and the greatest probability of a known one. "
+          "Refused, as in_ball and sectors are, where it reaches beyond what the voxels can address (3277 m "
+          "from 0 0 0 at 0.1 m).")
       .def(
           "in_ball",
           [](const ViewHandle& v, const py::object& centre, double radius) {
             const Eigen::Vector3d at = vector_of(centre, "centre");
+            if (!at.allFinite()) throw Refused("centre: found NaN or infinity, expected a finite place");
             limited_ball(radius, *v.view);
+            addressed({(at.array() - radius).matrix(), (at.array() + radius).matrix()}, *v.view,
+                      "centre, radius");
             return dict_of_contents(without_gil([&] { return v.view->in_ball(at, radius); }));
           },
           py::arg("centre"), py::arg("radius"),

@@ -39,6 +39,13 @@ class ArraysIn(unittest.TestCase):
             self.refused(view, "not contiguous", "numpy.ascontiguousarray")
         self.refused(large[63::-1, :80], "not contiguous", "strides (-160, 1)")
 
+    def test_elements_that_are_not_aligned_are_a_type_error(self):
+        records = np.zeros(120 * 161, np.uint8)  # rows of 40 floats and a byte
+        view = np.lib.stride_tricks.as_strided(records.view(np.float32), (120, 40), (161, 4))
+        with self.assertRaisesRegex(TypeError, "depth: found elements that are not aligned"):
+            pade.DepthImage(view)
+        pade.DepthImage(np.array(view))
+
     def test_a_crop_is_taken_as_it_is(self):
         large = support.texture(100, 200)
         a, b = large[10:74, 20:100], large[10:74, 22:102]
@@ -134,6 +141,19 @@ class Values(unittest.TestCase):
         np.testing.assert_allclose((pose @ pose).matrix, pose.matrix @ pose.matrix, atol=1e-12)
         np.testing.assert_allclose(pade.Pose(pose.matrix).quaternion, pose.quaternion, atol=1e-12)
         self.assertEqual(repr(eval(repr(pose))), repr(pose))
+
+    def test_a_rounded_quaternion_is_a_rotation(self):
+        rng = np.random.default_rng(3)
+        for digits in (3, 4, 6, 16):
+            for xyzw in rng.normal(size=(50, 4)):
+                rounded = np.round(xyzw / np.linalg.norm(xyzw), digits)
+                if abs(np.linalg.norm(rounded) - 1) > 1e-3:
+                    continue
+                turned = pade.Pose.from_quaternion([0, 0, 0], rounded)
+                rotation = turned.matrix[:3, :3]
+                np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
+                np.testing.assert_allclose(np.linalg.norm(turned([3, -4, 12])), 13, rtol=1e-14)
+                np.testing.assert_allclose((turned @ turned.inverse()).matrix, np.eye(4), atol=1e-14)
 
     def test_a_matrix_that_is_no_rigid_motion_is_refused(self):
         for wrong in (2 * np.eye(4), np.diag([1, 1, -1, 1]), np.ones((4, 4))):

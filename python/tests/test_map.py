@@ -172,6 +172,24 @@ class MapQueries(unittest.TestCase):
         np.testing.assert_array_equal(mapper.view().at(points), mapper.map.at(points))
         np.testing.assert_array_equal(pade.MapView(mapper.map).at(points), mapper.map.at(points))
 
+    def test_what_no_voxel_can_hold_is_refused_and_not_called_empty(self):
+        edge = 3276.8
+        for axis in range(3):
+            for side in (-1, 1):
+                for beyond in (4000 - edge, 0.3, 1e9):
+                    place = np.zeros(3)
+                    place[axis] = side * (edge + beyond - 0.5)  # a ball of 0.5 m about the second just reaches out
+                    for call in (lambda: self.view.in_ball(place, 0.5),
+                                 lambda: self.view.in_box(place - 0.5, place + 0.5),
+                                 lambda: self.view.sectors(place, 0.5, 0.5, 0.5)):
+                        with self.assertRaisesRegex(pade.Error, "within 3276.8 m of 0 0 0"):
+                            call()
+                place[axis] = side * (edge - 1)
+                counts = self.view.in_ball(place, 0.5)
+                self.assertEqual((counts["occupied"], counts["free"]), (0, 0))
+                self.assertGreater(counts["unknown"], 300)
+                self.assertLess(self.view.sectors(place, 0.5, 0.5, 0.5).max(), 0.2)
+
     def test_what_makes_no_sense_is_refused(self):
         for call, text in (
             (lambda: self.view.ray([0, 0, 0], [0, 0, 0], 1), "direction: found none"),
@@ -185,6 +203,8 @@ class MapQueries(unittest.TestCase):
             (lambda: self.view.flown([[0, 0, 0], [1e5, 0, 0]], 3), "path: found"),
             (lambda: self.view.sectors([0, 0, 0], 1e6, 1, 1), "reach, below, above: found"),
             (lambda: self.view.sectors([0, 0, np.nan], 5, 1, 1), "place, below, above: found NaN"),
+            (lambda: self.view.in_ball([0, np.nan, 0], 1), "centre: found NaN"),
+            (lambda: self.view.in_ball([0, 0, -np.inf], 1), "centre: found NaN or infinity"),
             (lambda: pade.RelativeMotion(np.eye(4) * np.nan, np.eye(4)), "expected finite numbers"),
             (lambda: pade.RelativeMotion(np.eye(4), np.eye(4), 0.1, -np.eye(6)), "covariance: found a matrix that is no covariance"),
             (lambda: pade.ObstacleMapper(support.camera()).add(

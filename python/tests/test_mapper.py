@@ -171,6 +171,10 @@ class Chain(unittest.TestCase):
         depth = pade.DepthEstimator(options).estimate(camera, motion, flow)
         self.assertAlmostEqual(float(depth.depth[120, 160]), 5, delta=0.01)
         self.assertAlmostEqual(float(depth.sigma[120, 160]), 5 * np.hypot(0.1 / 6.4, 0.02), delta=0.01)
+        image = np.zeros((240, 320), np.uint8)
+        for one in ({"reference": image}, {"other": image}):
+            with self.assertRaisesRegex(pade.Error, "reference, other: found one of them, expected both or none"):
+                pade.DepthEstimator(options).estimate(camera, motion, flow, **one)
 
 
 class Options(unittest.TestCase):

@@ -85,7 +85,47 @@ TEST_F(EvaluateMap, MeasuresARunAgainstItsWorld) {
   EXPECT_NEAR(replayed.at("reach").at("true_p10_m").get<double>(), 8.05 - 0.35 - 0.2, 1.5);
 }
 
+TEST_F(EvaluateMap, TheDepthOfARunWithPosesOfTheFilterIsComputedAnew) {
+  const std::string run = at("fi\xffter");  // and printed as JSON, whatever the name
+  const auto evaluated = [&](const std::string& more) {
+    const Outcome outcome = shell(kPade + " evaluate --json '" + run + "' " + more + " 2>/dev/null");
+    EXPECT_EQ(outcome.code, 0) << outcome.text;
+    return nlohmann::json::parse(outcome.text);
+  };
+  ASSERT_EQ(shell(kPade + " map " + at("flight") + " --poses from-imu-gnss --save depth --no-report -o '" +
+                  run + "'")
+                .code,
+            0);
+  const auto stored = nlohmann::json::parse(std::ifstream(run + "/evaluation.json"));
+  for (const std::string& more : {std::string(), "--sequence " + at("flight")}) {
+    const auto anew = evaluated(more);
+    EXPECT_TRUE(anew.at("computed_anew").get<bool>()) << more;
+    EXPECT_EQ(anew.at("frames"), stored.at("frames"));
+    EXPECT_EQ(anew.at("ranges").back().at("pixels"), stored.at("ranges").back().at("pixels"));
+  }
+  // Where that cannot be, it is said.
+  fs::rename(at("flight"), at("moved"));
+  EXPECT_FALSE(evaluated("").at("computed_anew").get<bool>());
+  const Outcome said = shell(kPade + " evaluate '" + run + "'");
+  EXPECT_EQ(said.code, 0);
+  EXPECT_THAT(said.text, HasSubstr("not computed anew"));
+  EXPECT_TRUE(evaluated("--sequence " + at("moved")).at("computed_anew").get<bool>());
+  // Runs with other limits have no mean.
+  fs::rename(at("moved"), at("flight"));
+  ASSERT_EQ(shell(kPade + " map " + at("flight") + " --range 6 --no-report -o " + at("near")).code, 0);
+  const Outcome mixed = shell(kPade + " evaluate " + at("run") + " " + at("near"));
+  EXPECT_EQ(mixed.code, 0);
+  EXPECT_THAT(mixed.text, testing::AllOf(HasSubstr("no mean over the runs"), HasSubstr("6, 20 m"),
+                                         testing::Not(HasSubstr("\nmean over runs\n"))));
+  EXPECT_THAT(shell(kPade + " evaluate " + at("run") + " " + at("run")).text,
+              HasSubstr("\nmean over runs\n"));
+}
+
 TEST_F(EvaluateMap, RefusesWhatItCannotCompare) {
+  const Outcome csv = evaluate("--csv " + at("out.csv"));
+  EXPECT_EQ(csv.code, 1);
+  EXPECT_THAT(csv.text, HasSubstr("--csv: found it with --world"));
+
   const Outcome no_world = shell(kPade + " evaluate " + at("run") + " --world " + at("none.sdf"));
   EXPECT_EQ(no_world.code, 1);
   EXPECT_THAT(no_world.text, HasSubstr("none.sdf"));

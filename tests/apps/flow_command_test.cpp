@@ -41,6 +41,43 @@ TEST(FlowCommand, ComparesMethodsOnASequenceWhoseFlowFollowsFromDepthAndPoses) {
   for (std::size_t i = 0; i < best.size(); ++i) EXPECT_LE(best[i], remaining[i] + 1e-9) << i;
 }
 
+TEST(FlowCommand, SaysThatAMethodHasNoSigmaRatherThanThatItIsPerfect) {
+  const std::string flight = PADE_SAMPLE_FLIGHT;
+  const std::string command =
+      kPade + " flow evaluate " + flight + " --pairs 2 --flow clg-fast,opencv-pyrlk --confidence local";
+  const Outcome outcome = shell(command + " --json");
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  const auto json = nlohmann::json::parse(outcome.text);
+  for (const auto& [method, figures] : json.at("folders").at(flight).items()) {
+    std::vector<nlohmann::json> rows = {figures.at("mean")};
+    for (const auto& pair : figures.at("pairs")) rows.push_back(pair);
+    for (const auto& row : rows) {
+      const auto& confidence = row.at("confidence");
+      EXPECT_EQ(confidence.is_null(), method == "opencv-pyrlk") << method;
+      if (confidence.is_null()) continue;
+      EXPECT_GT(confidence.at("aee_of_surest_70_percent").get<double>(), 0) << method;
+    }
+  }
+  const Outcome table = shell(command + " --mean");
+  EXPECT_THAT(table.text, testing::ContainsRegex("opencv-pyrlk[^\n]* - +- +- +- +- *\n"));
+}
+
+TEST(FlowCommand, RefusesAPictureThatCannotBeWrittenBeforeItWritesAnything) {
+  const test::TemporaryFolder folder;
+  const std::string image = (folder.path() / "one.png").string();
+  ASSERT_TRUE(cv::imwrite(image, cv::Mat(48, 64, CV_8UC1, cv::Scalar(9))));
+  const std::string out = (folder.path() / "out.flo").string();
+  const std::string command = kPade + " flow " + image + " " + image + " --flow clg-fast --out " + out;
+  for (const char* name : {"x.xyz", "x", ".png.txt"}) {
+    const Outcome outcome = shell(command + " --picture " + (folder.path() / name).string());
+    EXPECT_EQ(outcome.code, 1) << name;
+    EXPECT_THAT(outcome.text, testing::AllOf(HasSubstr("--picture"), HasSubstr(name)));
+    EXPECT_FALSE(std::filesystem::exists(out)) << name;
+  }
+  EXPECT_THAT(shell(command + " --full-scale 3").text, HasSubstr("--full-scale: found it without --picture"));
+  EXPECT_EQ(shell(command + " --full-scale 3 --picture " + (folder.path() / "x.png").string()).code, 0);
+}
+
 TEST(FlowCommand, SaysWhatAFolderToEvaluateMustHold) {
   const test::TemporaryFolder folder;
   const Outcome outcome = shell(kPade + " flow evaluate " + folder.path().string() + " --flow clg-fast");

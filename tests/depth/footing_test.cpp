@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ struct View {
   cv::Mat truth;  // depth of the wall; infinity where there is sky
 };
 
-/// @param wall  Z of a blank wall; infinity = sky. @param up  camera axes
+/// @param wall  how far ahead a blank wall stands, level; infinity = sky. @param up  camera axes
 View looking(double wall, const Vector3d& up = kUp) {
   View view;
   const cv::Size size(view.camera.width, view.camera.height);
@@ -42,13 +43,16 @@ View looking(double wall, const Vector3d& up = kUp) {
   view.image.bound = view.image.depth.clone();
   view.image.state = cv::Mat(size, CV_8UC1, cv::Scalar(static_cast<int>(DepthState::no_texture)));
   view.truth = cv::Mat(size, CV_32FC1, cv::Scalar(wall));
+  const Vector3d ahead = (Vector3d::UnitZ() - up.z() * up).normalized();
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       const Vector3d ray((u - view.camera.cx) / view.camera.fx, (v - view.camera.cy) / view.camera.fy, 1);
       const double down = -up.dot(ray);
       const double ground = down > 0 ? kHeight / down : std::numeric_limits<double>::infinity();
       constexpr double kHorizon = 200;
-      if (ground > std::min(wall, kHorizon)) continue;
+      const double of_wall = wall / ray.dot(ahead);
+      view.truth.at<float>(v, u) = static_cast<float>(of_wall);
+      if (ground > std::min(of_wall, kHorizon)) continue;
       view.image.bound.at<float>(v, u) = static_cast<float>(ground);
       view.image.state.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(DepthState::measured);
     }
@@ -70,8 +74,9 @@ const FootingOptions kFar{true, 1000};
 /// However the camera is turned, a blank wall is never taken for farther than it is, and for not much nearer.
 TEST(Footing, ABlankWallIsAsFarAsTheGroundBeforeIt) {
   for (const double wall : {5.0, 9.0}) {
-    for (const double bank : {0.0, 0.2, -0.35}) {
-      const Vector3d up = banked(bank, 0);
+    for (const auto& [bank, pitch] :
+         {std::pair{0.0, 0.0}, {0.2, 0.0}, {-0.35, 0.0}, {0.0, 0.2}, {0.0, 0.35}, {0.2, 0.2}}) {
+      const Vector3d up = banked(bank, pitch);
       View view = looking(wall, up);
       bound_by_footing(view.image, view.camera, up, kFar);
       int bounded = 0;
@@ -83,11 +88,14 @@ TEST(Footing, ABlankWallIsAsFarAsTheGroundBeforeIt) {
           const float bound = view.image.bound.at<float>(v, u);
           if (!(bound > 0)) continue;
           ++bounded;
-          ASSERT_LE(bound, wall * 1.001) << v << ' ' << u << " banked by " << bank;
-          ASSERT_GE(bound, wall * 0.7) << v << ' ' << u << " banked by " << bank;
+          const float truth = view.truth.at<float>(v, u);
+          ASSERT_LE(bound, truth * 1.001F)
+              << v << ' ' << u << " banked by " << bank << ", pitched by " << pitch;
+          ASSERT_GE(bound, truth * 0.7F)
+              << v << ' ' << u << " banked by " << bank << ", pitched by " << pitch;
         }
       }
-      EXPECT_GT(bounded, blank * 0.8) << "banked by " << bank;
+      EXPECT_GT(bounded, blank * 0.8) << "banked by " << bank << ", pitched by " << pitch;
     }
   }
 }

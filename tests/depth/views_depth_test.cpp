@@ -179,5 +179,30 @@ TEST(ViewsDepth, TheSearchStartsWhereTheLastFrameHasEnded) {
   EXPECT_LT(right({pair.T_world_other, 2 / last_truth}), 0.1);
 }
 
+/// A camera that stands or creeps: the flow of the pair is noise, which says nothing against what was found
+/// over baselines of before. Where the pair has measured a depth, or sees parallax, it does.
+TEST(ViewsDepth, APairWithoutParallaxDoesNotGainsayWhatWasFound) {
+  for (const double step : {0.0, 0.0005, 0.003}) {
+    const ScenePair pair(simulation::analytic_camera(160, 120), {0, 0, -step}, {0.01, -0.02, 0.005});
+    const cv::Mat last_truth = simulation::exact_depth(pair.flight.scene, pair.camera, pair.T_world_other);
+    const InverseDepthImage last{pair.T_world_other, 1 / last_truth};
+    cv::Mat flow(pair.truth.size(), CV_32FC2);
+    cv::RNG random(1);
+    random.fill(flow, cv::RNG::NORMAL, 0, 0.2);
+    DepthImage two_view;
+    const auto right = [&] {
+      const cv::Mat rho =
+          start_of_views(two_view, flow, pair.camera, pair.motion, pair.T_world_reference, last, 3, {});
+      EXPECT_TRUE(cv::checkRange(rho));
+      const cv::Mat inner = cv::abs(rho.mul(pair.truth) - 1) < 1e-2;
+      return cv::countNonZero(inner) / static_cast<double>(cv::countNonZero(pair.truth > 0));
+    };
+    two_view.depth = cv::Mat(pair.truth.size(), CV_32FC1, cv::Scalar(kNan));
+    EXPECT_GT(right(), 0.8) << step;
+    two_view.depth.setTo(3.5);  // measured, and far from what was found
+    EXPECT_LT(right(), 0.2) << step;
+  }
+}
+
 }  // namespace
 }  // namespace pade::depth

@@ -188,6 +188,19 @@ TEST(DepthAccuracy, AveragesSequencesNotPixels) {
   EXPECT_TRUE(std::isnan(mean.ranges[1].mean)) << "no sequence has pixels there";
 }
 
+TEST(DepthAccuracy, OfSequencesWithSeveralLimitsStatesNone) {
+  DepthAccuracy near, far;
+  near.max_depth = 10;
+  far.max_depth = 40;
+  const auto limit = [](std::initializer_list<DepthAccuracy> all) {
+    return average(std::vector<DepthAccuracy>(all)).max_depth;
+  };
+  EXPECT_EQ(limit({near, near, near}), 10);
+  EXPECT_TRUE(std::isnan(limit({near, far})));
+  EXPECT_TRUE(std::isnan(limit({near, far, near})));
+  EXPECT_TRUE(std::isnan(limit({near, near, DepthAccuracy{}}))) << "one without a limit";
+}
+
 TEST(RelativeError, IsSignedAndNaNWhereUnknown) {
   const cv::Mat error = relative_error(estimate_of(row({3, 1, kNoDepth, 1})), row({2, 2, 2, kNoDepth}));
   EXPECT_FLOAT_EQ(error.at<float>(0), 0.5F);

@@ -1,5 +1,6 @@
 // `pade live` as systemd and people run it: a process, an autopilot on the other end of the line, and
 // signals.
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -68,13 +69,13 @@ class LiveCommand : public testing::Test {
     const auto text = io::read_file(folder_ / "said");
     return text ? *text : std::string();
   }
-  /// Starts the program, its output in the file "said".
-  [[nodiscard]] pid_t start(const fs::path& file) const {
+  /// Starts the program, its output in the file "said", or where it is told.
+  [[nodiscard]] pid_t start(const fs::path& file, int said = -1) const {
     const std::string out = (folder_ / "said").string();
     const std::string yaml = file.string();
     const pid_t child = ::fork();
     if (child != 0) return child;
-    const int said = ::open(out.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0600);
+    if (said < 0) said = ::open(out.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0600);
     ::dup2(said, STDOUT_FILENO);
     ::dup2(said, STDERR_FILENO);
     ::execl(PADE_PROGRAM, "pade", "live", yaml.c_str(), nullptr);
@@ -110,6 +111,74 @@ TEST_F(LiveCommand, SavesItsMapOnSigtermWithinTwoSecondsAndOutlivesItsTerminal) 
   EXPECT_THAT(autopilot.texts().back(), HasSubstr("has ended"));
 }
 
+/// `pade live vehicle.yaml | head`, and a log that nobody reads any more: both would end or hold up the
+/// flight.
+TEST_F(LiveCommand, OutlivesWhoeverReadsItsLog) {
+  record(200);
+  for (const bool closed : {true, false}) {
+    int log[2];
+    ASSERT_EQ(::pipe2(log, O_CLOEXEC), 0);
+    if (closed) {
+      ::close(log[0]);
+    } else {  // full
+      ASSERT_EQ(::fcntl(log[1], F_SETFL, O_NONBLOCK), 0);
+      while (::write(log[1], "x", 1) == 1) {
+      }
+      ASSERT_EQ(::fcntl(log[1], F_SETFL, 0), 0);
+    }
+    // An earlier recording: so there is something to say at the start.
+    std::ofstream(folder_ / "flight.mcap") << "earlier";
+    const UdpAutopilot autopilot(now_of_ours(), kPort);
+    const std::string more = fmt::format("autosave: 0\nrecord: {}\n", (folder_ / "flight.mcap").string());
+    const pid_t session = start(config(map_line() + more), log[1]);
+    ::close(log[1]);
+    int status = -1;
+    bool ended = false;
+    const auto wait_for = [&](const auto& condition) {
+      constexpr double kPatience = 25;  // s
+      const Time begun = now_of_ours();
+      while (!ended && !condition() && seconds_between(begun, now_of_ours()) < kPatience) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        ended = ::waitpid(session, &status, WNOHANG) != 0;
+      }
+    };
+    wait_for([&] { return autopilot.sectors().size() >= 3; });
+    EXPECT_GE(autopilot.sectors().size(), 3U);
+    if (!ended) ::kill(session, SIGTERM);
+    wait_for([&] { return fs::exists(folder_ / "map.bt"); });  // all that is left is to say so
+    if (!closed) ::close(log[0]);
+    wait_for([] { return false; });
+    if (!ended) {
+      ::kill(session, SIGKILL);
+      ::waitpid(session, &status, 0);
+    }
+    EXPECT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+    EXPECT_TRUE(fs::exists(folder_ / "map.bt"));
+    fs::remove(folder_ / "map.bt");
+  }
+}
+
+/// A map that cannot be written is heard of in flight, and not at its end.
+TEST_F(LiveCommand, TellsThePilotOfAMapThatCannotBeSaved) {
+  record(200);
+  fs::create_directory(folder_ / "map.bt");  // in its way
+  const pid_t session = start(config(map_line() + "autosave: 0.1\n"));
+  const UdpAutopilot autopilot(now_of_ours(), kPort);
+  const Time begun = now_of_ours();
+  const auto told = [&] {
+    const auto texts = autopilot.texts();
+    return std::count(texts.begin(), texts.end(), "PADE: the map cannot be saved");
+  };
+  while (told() == 0 && seconds_between(begun, now_of_ours()) < 18)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(told(), 1);
+  EXPECT_THAT(said(), HasSubstr("the map cannot be saved: "));
+  ::kill(session, SIGTERM);
+  int status = -1;
+  ::waitpid(session, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << said();
+}
+
 TEST_F(LiveCommand, CheckFindsWhatIsThereAndWhatIsNot) {
   record(100);
   const std::string command = fmt::format("{} live --check {}", test::kPade, config(map_line()).string());
@@ -135,6 +204,32 @@ TEST_F(LiveCommand, ShowsItselfOverTheNetworkWhereThatIsAskedFor) {
   EXPECT_THAT(test::shell(fmt::format("{} live {}", test::kPade, file)).text, Not(HasSubstr("24583")));
 }
 
+/// As the service, whose configuration is in /etc and whose folder is its own.
+TEST_F(LiveCommand, LooksForItsInputsBesideItsConfiguration) {
+  record(2);
+  fs::create_directory(folder_ / "state");
+  std::ofstream(folder_ / "live.yaml") << fmt::format(
+      "camera: {{kind: folder, path: flight, calibration: missing.yaml}}\n"
+      "link: {{port: \"udp:{}\"}}\nmap: map.bt\n",
+      kPort);
+  const std::string command =
+      fmt::format("cd {} && {} live ../live.yaml", (folder_ / "state").string(), test::kPade);
+  EXPECT_THAT(test::shell(command).text, AllOf(HasSubstr("../missing.yaml"), Not(HasSubstr("state"))));
+  fs::rename(folder_ / "flight" / "camera.yaml", folder_ / "missing.yaml");
+  EXPECT_THAT(test::shell(command).text, HasSubstr("2 frames: "));
+}
+
+TEST_F(LiveCommand, TheServiceIsStartedAgainHoweverOftenItFails) {
+  const auto unit = io::read_file(fs::path(PADE_SOURCE_DIR) / "config" / "systemd" / "pade-live@.service.in");
+  ASSERT_TRUE(unit);
+  const auto section = [&](const std::string& name) {
+    const std::size_t begin = unit->find(name);
+    return unit->substr(begin, unit->find("\n[", begin) - begin);
+  };
+  EXPECT_THAT(section("[Unit]"), HasSubstr("\nStartLimitIntervalSec=0\n"));
+  EXPECT_THAT(section("[Service]"), HasSubstr("\nRestart=on-failure\n"));
+}
+
 TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
   record(3);
   const struct {
@@ -146,6 +241,7 @@ TEST_F(LiveCommand, RefusesByNameWhatCannotWork) {
       {"autosave: -1\n", "autosave is -1"},
       {"sectors: {own_radius: 10, max_distance: 5}\n", "sectors.own_radius is 10"},
       {"sectors: {max_distance: .nan}\n", "sectors.max_distance"},
+      {"mapper: {map: {voxel: 0.001}}\n", "sectors.max_distance: found 20, expected at most 16.4 m"},
       {"mapper_: {}\n", "mapper_"},
       {"web: {address: 0.0.0.0}\n", "web.token: found none"},
       {"web: {port: 99999}\n", "web.port"},

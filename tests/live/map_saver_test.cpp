@@ -1,6 +1,7 @@
 // The map on disk while a session goes on: whole at any moment, whatever ends the program.
 #include "pade/live/map_saver.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -20,7 +21,10 @@
 
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/text.hpp"
+#include "pade/live/recordings/session_recorder.hpp"
 #include "pade/live/service.hpp"
+
+#include "support/synced_files.hpp"
 
 namespace pade::live {
 namespace {
@@ -133,6 +137,41 @@ TEST_F(MapOnDisk, OfAnEarlierSessionIsKeptToo) {
   EXPECT_FALSE(fs::exists(file("map-2.bt")));
 }
 
+/// Neither a session in which nothing was seen nor one that wrote only at its end costs what was there.
+TEST_F(MapOnDisk, OfAnEarlierSessionIsNotWrittenOverByAnEmptyOne) {
+  std::ofstream(file("map.bt")) << "earlier";
+  const OccupancyMap empty = std::move(OccupancyMap::create()).value();
+  {
+    MapSaver saver(file("map.bt"), 0.01);
+    saver.take(update_with(MapView::of(empty)));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    const SaverReport report = saver.finish();
+    EXPECT_FALSE(report.any);
+    EXPECT_EQ(report.saved, 0U);
+    EXPECT_EQ(content("map.bt"), "earlier");
+  }
+  MapSaver saver(file("map.bt"), 0);
+  EXPECT_FALSE(saver.finish().any);
+  ASSERT_TRUE(saver.write_last(empty));  // whatever it holds, and though no view ever came
+  EXPECT_EQ(content("map-1.bt"), "earlier");
+  EXPECT_EQ(saver.report().earlier, file("map-1.bt").string());
+  ASSERT_TRUE(saver.write_last(empty));
+  EXPECT_FALSE(fs::exists(file("map-2.bt"))) << "its own is written over";
+}
+
+/// What cannot be moved stays.
+TEST_F(MapOnDisk, OfAnEarlierSessionThatCannotBeMovedStays) {
+  // Longer than a name may be once it has its number.
+  const std::string name = std::string(252, 'm') + ".bt";
+  std::ofstream(file(name)) << "earlier";
+  MapSaver saver(file(name), 0);
+  saver.finish();
+  const Status status = saver.write_last(std::move(OccupancyMap::create()).value());
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, testing::HasSubstr("cannot be moved"));
+  EXPECT_EQ(content(name), "earlier");
+}
+
 TEST_F(MapOnDisk, ThatCannotBeWrittenIsCountedAndNamed) {
   MapSaver saver(folder_ / "nowhere" / "map.bt", 0.02);
   saver.take(update_with(walls(1)));
@@ -174,6 +213,50 @@ TEST_F(MapOnDisk, IsWholeAfterFiftyKills) {
     }
   }
   EXPECT_EQ(there, 50);
+}
+
+/// Pulling the battery takes what the system had not written yet: of a file the bytes, so that it is there
+/// and empty, of a folder the names.
+TEST_F(MapOnDisk, IsOnTheDiskItselfAndSoIsTheRecording) {
+  using testing::Contains;
+  test::SyncedFiles& disk = test::SyncedFiles::all();
+  const auto expect_whole = [&](const std::string& name, const std::string& before) {
+    const auto synced = disk.take();
+    const auto file = std::find_if(synced.begin(), synced.end(), [&](const test::Synced& s) {
+      return s.path.find(before) != std::string::npos && s.bytes == content(name).size();
+    });
+    ASSERT_NE(file, synced.end()) << name << ": its bytes";
+    EXPECT_TRUE(std::any_of(file, synced.end(),
+                            [&](const test::Synced& s) {
+                              return s.path == folder_.string() &&
+                                     std::count(s.names.begin(), s.names.end(), name) == 1;
+                            }))
+        << name << ": its name";
+  };
+  disk.take();
+  const auto view = walls(2);
+  MapSaver saver(file("map.bt"), 0.02);
+  saver.take(update_with(view));
+  ASSERT_TRUE(within_seconds(5, [&] { return saver.report().saved > 0; }));
+  expect_whole("map.bt", ".map.bt.partial");
+  saver.begin_anew();
+  ASSERT_TRUE(within_seconds(5, [&] { return saver.report().finished.size() == 1; }));
+  expect_whole("map-1.bt", ".map-1.bt.partial");
+  saver.finish();
+
+  OccupancyMap map = std::move(OccupancyMap::create()).value();
+  MapSaver last(file("end.ot"), 0);
+  last.finish();
+  ASSERT_TRUE(last.write_last(map));
+  expect_whole("end.ot", ".end.ot.partial");
+
+  Camera small;
+  small.width = small.height = 8;
+  auto recorder = SessionRecorder::create(file("flight.mcap"), small, {});
+  ASSERT_TRUE(recorder) << recorder.error().message;
+  (*recorder)->take({cv::Mat::zeros(8, 8, CV_8UC1), Time{1'000'000'000}, Pose{}, Matrix6d::Zero()});
+  ASSERT_TRUE((*recorder)->finish());
+  expect_whole("flight.mcap", "flight.mcap.part");
 }
 
 /// A socket as systemd has one.

@@ -317,6 +317,46 @@ TEST(Sectors, WhereNobodyHasLookedNothingIsSaid) {
   }
 }
 
+/// Far from the origin of its estimate a vehicle comes to where no map can hold anything.
+TEST(Sectors, NothingIsFreeWhereNoMapCanReach) {
+  constexpr double kBorder = 32768 * kVoxel;
+  const double edges[] = {-kBorder, kBorder};
+  for (const double edge : edges) {
+    // All is free as far as it can be addressed.
+    auto tree = std::make_unique<octomap::OcTree>(kVoxel);
+    const double inwards = edge > 0 ? -1 : 1;
+    for (double x = kVoxel / 2; x < 14; x += kVoxel) {
+      for (double y = -12 + kVoxel / 2; y < 12; y += kVoxel) {
+        for (double z = -1.5 + kVoxel / 2; z < 1.5; z += kVoxel)
+          tree->setNodeValue(octomap::point3d(static_cast<float>(edge + inwards * x), static_cast<float>(y),
+                                              static_cast<float>(z)),
+                             -1.0F);
+      }
+    }
+    tree->updateInnerOccupancy();
+    const auto view = MapView::of(std::move(OccupancyMap::create(options_of_map(), std::move(tree))).value());
+    Pose body;
+    const std::size_t east = edge > 0 ? 0 : 36;  // the bin that looks over the border
+    body.translation = {edge + 3 * inwards, 0, 0};
+    const auto near = obstacle_distances(*view, body, options_of_sectors());
+    EXPECT_EQ(near[east], kUnknownDistance);
+    EXPECT_EQ(near[(east + 18) % kBins], 1001) << "along the border all was seen";
+    for (const double beyond : {0.5, 5.0, 9.0, 50.0, 800.0, 1e5, 1e9, 1e15}) {
+      body.translation = {edge - beyond * inwards, 0, 0};
+      const auto outside = obstacle_distances(*view, body, options_of_sectors());
+      EXPECT_EQ(outside[east], kUnknownDistance) << beyond;
+      for (const std::uint16_t d : outside) {  // what nobody has seen is the vehicle's own up to 1 m
+        if (beyond > 1) {
+          ASSERT_EQ(d, kUnknownDistance) << beyond;
+        }
+      }
+      body.translation = {edge + 3 * inwards, 0, edge - beyond * inwards};
+      for (const std::uint16_t d : obstacle_distances(*view, body, options_of_sectors()))
+        ASSERT_EQ(d, kUnknownDistance) << beyond << " up";
+    }
+  }
+}
+
 TEST(Sectors, BearingsCountClockwiseFromAheadAndTheSlabIsLevel) {
   const OccupancyMap empty = free_map(2);
   const Vector3d left = centre_of_voxel(0.1, 3, 0.1);

@@ -5,8 +5,11 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <numbers>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -15,6 +18,7 @@
 
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/sequence/sequence.hpp"
+#include "pade/io/text.hpp"
 #include "pade/live/recordings/session_recorder.hpp"
 
 #include "live/wall_camera.hpp"
@@ -36,7 +40,8 @@ class EastwardPoses : public NavigationSource {
     if (!come || age < late + until_next) return {};
     PoseAnswer answer{PoseAnswer::Kind::valid, {}, {}, jumped};
     answer.T_world_body.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
-    answer.T_world_body.translation.x() = kSpeed * seconds_between(zero_, time);
+    answer.T_world_body.translation = start;
+    answer.T_world_body.translation.x() += kSpeed * seconds_between(zero_, time);
     return answer;
   }
 
@@ -44,6 +49,7 @@ class EastwardPoses : public NavigationSource {
   std::atomic<double> late{0};   // s
   std::atomic<double> burst{0};  // s from message to message
   std::atomic<std::size_t> jumped{0};
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();  // to be set before the session runs
   [[nodiscard]] std::optional<Matrix6d> motion_covariance(Time t1, Time t2,
                                                           const Pose& /*camera*/) const override {
     if (!known_motion) return std::nullopt;
@@ -114,6 +120,25 @@ struct Bed {
 void expect_all_counted(const SessionCounts& counts, std::size_t delivered) {
   EXPECT_EQ(counts.frames, delivered);
   EXPECT_EQ(counts.frames, counts.mapped + counts.skipped + counts.dropped);
+}
+
+std::string bytes_of(const mapping::OccupancyMap& map) {
+  return io::bytes_of(io::encode_map(map, io::MapFormat::bt));
+}
+
+/// The map that a recording makes.
+std::string replayed(const std::filesystem::path& file, const ObstacleMapperOptions& options) {
+  const auto sequence = io::Sequence::open(file);
+  EXPECT_TRUE(sequence) << sequence.error().message;
+  if (!sequence) return {};
+  auto mapper = ObstacleMapper::create(sequence->camera(), options, sequence->mask());
+  EXPECT_TRUE(mapper);
+  for (std::size_t i = 0; i < sequence->size(); ++i) {
+    const auto frame = sequence->frame(i);
+    EXPECT_TRUE(frame) << frame.error().message;
+    if (frame) mapper->add(frame->image, frame->time, frame->T_world_camera, frame->motion_covariance);
+  }
+  return bytes_of(mapper->map());
 }
 
 TEST(Session, MapsTheWallAhead) {
@@ -222,6 +247,41 @@ TEST(Session, AJumpOfThePosesBeginsTheMapAnew) {
   EXPECT_GT(counts.mapped_anew, 0U);
 }
 
+/// A map ends 32768 voxels from its origin; the flight does not.
+TEST(Session, FarFromTheOriginOfThePosesTheMapHasOneOfItsOwn) {
+  const test::TemporaryFolder folder;
+  const WallCamera camera(10);
+  auto recorder = SessionRecorder::create(folder / "flight.mcap", camera.camera(), camera.mask());
+  ASSERT_TRUE(recorder) << recorder.error().message;
+  Bed bed(10, recorder->get());
+  bed.poses.start = {0, -40'000, 120};
+  const auto& counts = bed.run(2, [](double) {});
+  EXPECT_EQ(counts.restarts, 0U);
+  EXPECT_EQ(counts.outside, 0U);
+  EXPECT_NEAR(bed.session->origin().y(), -40'000, 1);
+  EXPECT_NEAR(bed.session->origin().z(), 120, 1);
+  EXPECT_GT(bed.session->map().counts().occupied, 50U);
+  ASSERT_FALSE(bed.gatherer.ages.empty());
+  const LiveUpdate& last = bed.gatherer.last;
+  EXPECT_NEAR(obstacle_distances(*last.view, last.T_world_body, SectorOptions{})[0], 285, 50);
+  ASSERT_TRUE((*recorder)->finish());
+  EXPECT_EQ(replayed(folder / "flight.mcap", bed.mapper), bytes_of(bed.session->map()));
+}
+
+TEST(Session, NearTheBorderOfAMapAnotherIsBegun) {
+  Bed bed(10);
+  bed.poses.start = {32768 * bed.mapper.map.voxel - 200 - 0.8 * kSpeed, 5, 0};
+  const auto& counts = bed.run(1.6, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_EQ(counts.restarts, 1U);
+  EXPECT_EQ(counts.borders, 1U);
+  EXPECT_EQ(bed.gatherer.begun_anew, 1);
+  EXPECT_LT(counts.mapped_anew, counts.mapped);
+  EXPECT_NEAR(bed.session->origin().x(), bed.poses.start.x() + 0.8 * kSpeed, 0.3);
+  EXPECT_NEAR(bed.session->origin().y(), 5, 1e-6);
+  EXPECT_LT(bed.gatherer.last.T_world_body.translation.norm(), 2);
+}
+
 /// An autopilot that starts anew on the ground and then has no pose leaves the flight's map as it is.
 TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
   Bed bed(10);
@@ -231,25 +291,6 @@ TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
   });
   EXPECT_EQ(counts.restarts, 0U);
   EXPECT_FALSE(bed.session->map().bounds().isEmpty());
-}
-
-std::string bytes_of(const mapping::OccupancyMap& map) {
-  return io::bytes_of(io::encode_map(map, io::MapFormat::bt));
-}
-
-/// The map that a recording makes.
-std::string replayed(const std::filesystem::path& file, const ObstacleMapperOptions& options) {
-  const auto sequence = io::Sequence::open(file);
-  EXPECT_TRUE(sequence) << sequence.error().message;
-  if (!sequence) return {};
-  auto mapper = ObstacleMapper::create(sequence->camera(), options, sequence->mask());
-  EXPECT_TRUE(mapper);
-  for (std::size_t i = 0; i < sequence->size(); ++i) {
-    const auto frame = sequence->frame(i);
-    EXPECT_TRUE(frame) << frame.error().message;
-    if (frame) mapper->add(frame->image, frame->time, frame->T_world_camera, frame->motion_covariance);
-  }
-  return bytes_of(mapper->map());
 }
 
 TEST(SessionRecording, MakesTheSameMapAgain) {
@@ -262,7 +303,7 @@ TEST(SessionRecording, MakesTheSameMapAgain) {
     const auto& counts = bed.run(2, [](double) {});
     const Status finished = (*recorder)->finish();
     ASSERT_TRUE(finished) << finished.error().message;
-    ASSERT_EQ((*recorder)->left_out(), 0U);
+    ASSERT_EQ((*recorder)->report().left_out, 0U);
     EXPECT_GT(counts.mapped, 8U);
     EXPECT_EQ(replayed(folder / name, bed.mapper), bytes_of(bed.session->map())) << name;
   }
@@ -276,10 +317,95 @@ TEST(SessionRecording, BeginsAnewWithTheMap) {
   Bed bed(10, recorder->get());
   bed.run(2, [&](double elapsed) { bed.poses.jumped = elapsed > 1 ? 1 : 0; });
   ASSERT_TRUE((*recorder)->finish());
-  EXPECT_EQ((*recorder)->file(), folder / "flight-2.mcap");
+  EXPECT_EQ((*recorder)->report().file, folder / "flight-2.mcap");
   EXPECT_EQ(replayed(folder / "flight-2.mcap", bed.mapper), bytes_of(bed.session->map()));
   EXPECT_TRUE(std::filesystem::exists(folder / "flight.mcap"));
   EXPECT_EQ(folder.entries(), 2U);
+}
+
+/// Frames of 8 x 8 pixels for a recorder.
+class FewFrames {
+ public:
+  explicit FewFrames(std::filesystem::path file, const RecorderLimits& limits = {})
+      : recorder_(SessionRecorder::create(std::move(file), camera(), {}, limits)) {}
+  SessionRecorder& operator*() { return *recorder_.value(); }
+  void add(int frames) {
+    for (int i = 0; i < frames; ++i)
+      recorder_.value()->take(
+          {cv::Mat::zeros(8, 8, CV_8UC1), Time{++count_ * 100'000'000LL}, Pose{}, Matrix6d::Zero()});
+  }
+  /// Frames in a recording.
+  static std::size_t in(const std::filesystem::path& file) {
+    const auto sequence = io::Sequence::open(file);
+    EXPECT_TRUE(sequence) << sequence.error().message;
+    return sequence ? sequence->size() : 0;
+  }
+
+ private:
+  static Camera camera() {
+    Camera camera;
+    camera.width = camera.height = 8;
+    camera.fx = camera.fy = 8;
+    return camera;
+  }
+  Result<std::unique_ptr<SessionRecorder>> recorder_;
+  int count_ = 0;
+};
+
+void write_text(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
+std::string text_in(const std::filesystem::path& file) {
+  const auto text = io::read_file(file);
+  return text ? *text : std::string();
+}
+
+/// A power cut and a start anew: what was recorded until then is all that there is of that flight.
+TEST(SessionRecording, IsNeverWrittenOverByALaterSession) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "flight.mcap", "finished");
+  write_text(folder / "flight.mcap.part", "begun");
+  write_text(folder / "flight-2.mcap.part", "begun, second map");
+  FewFrames flight(folder / "flight.mcap");
+  EXPECT_THAT((*flight).report().earlier, ::testing::ElementsAre((folder / "flight-1.mcap").string(),
+                                                                 (folder / "flight-3.mcap.part").string()));
+  flight.add(3);
+  (*flight).begin_anew();
+  flight.add(2);
+  ASSERT_TRUE((*flight).finish());
+  EXPECT_EQ(text_in(folder / "flight-1.mcap"), "finished");
+  EXPECT_EQ(text_in(folder / "flight-2.mcap.part"), "begun, second map");
+  EXPECT_EQ(text_in(folder / "flight-3.mcap.part"), "begun");
+  EXPECT_EQ(FewFrames::in(folder / "flight.mcap"), 3U);
+  EXPECT_EQ((*flight).report().file, folder / "flight-4.mcap");
+  EXPECT_EQ(FewFrames::in(folder / "flight-4.mcap"), 2U);
+  EXPECT_EQ(folder.entries(), 5U);
+}
+
+/// The map needs the last of the disk more than the recording does.
+TEST(SessionRecording, EndsWholeBeforeTheDiskIsFull) {
+  const test::TemporaryFolder folder;
+  std::atomic<int> asked{0};  // when it begins, and for each frame
+  RecorderLimits limits;
+  limits.available = [&](const std::filesystem::path& /*file*/) -> std::uintmax_t {
+    return asked++ < 4 ? 500'000'000 : 499'999'999;
+  };
+  FewFrames flight(folder / "flight.mcap", limits);
+  flight.add(4);
+  (*flight).begin_anew();
+  flight.add(2);
+  ASSERT_TRUE((*flight).finish());
+  const RecorderReport report = (*flight).report();
+  EXPECT_EQ(report.ended, "the disk has less than 500 MB left");
+  EXPECT_EQ(report.left_out, 3U);
+  EXPECT_EQ(report.file, folder / "flight.mcap");
+  EXPECT_EQ(folder.entries(), 1U);
+  EXPECT_EQ(FewFrames::in(folder / "flight.mcap"), 3U);
+
+  FewFrames late(folder / "late.mcap", limits);
+  late.add(1);
+  const Status finished = (*late).finish();
+  ASSERT_FALSE(finished);
+  EXPECT_THAT(finished.error().message, ::testing::HasSubstr("nothing was recorded: the disk has less"));
+  EXPECT_EQ(folder.entries(), 1U);
 }
 
 TEST(SessionRecording, WithoutAFrameSaysSo) {

@@ -69,7 +69,7 @@ class UdpAutopilot {
     while (!over_) {
       const std::int64_t now = now_of_ours().nanoseconds;
       if (now > next_heartbeat)
-        tell(mavlink::Heartbeat{2, 3, 0, 0, 4, 3}), next_heartbeat = now + 1'000'000'000;
+        tell(mavlink::Heartbeat{2, 3, 0x81, 0, 4, 3}), next_heartbeat = now + 1'000'000'000;
       if (now > next_pose) tell_pose(), next_pose = now + 33'000'000;
       hear();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));

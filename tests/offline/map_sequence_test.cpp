@@ -6,6 +6,7 @@
 #include <random>
 #include <sstream>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
@@ -168,6 +169,43 @@ TEST_F(MapSequence, OneDamagedImageIsSkippedAndNamedAndMostOfThemAreRefused) {
   for (const char* name : {"0.000000.png", "0.300000.png", "0.400000.png"}) damage(name);
   EXPECT_FALSE(map("refused"));
   EXPECT_FALSE(fs::exists(root_ / "refused"));
+}
+
+TEST_F(MapSequence, TrueDepthThatCannotBeUsedIsNamedAndCounted) {
+  const auto file = [&](int i) { return sequence() / "depth" / fmt::format("0.{}00000.png", i); };
+  const auto damage = [&](int i) { fs::resize_file(file(i), 300); };
+  const auto shrink = [&](int i) {
+    cv::imwrite(file(i).string(), cv::Mat(60, 80, CV_16UC1, cv::Scalar(900)));
+  };
+  MapSequenceOptions strict;
+  strict.sequence.strict = true;
+  ASSERT_TRUE(map("good", strict));
+  damage(1);
+  shrink(3);
+  for (const int threads : {1, 2}) {
+    const auto result = map(fmt::format("run{}", threads), {}, threads);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_EQ(result->info.health.frames_used, 6) << "the images are good";
+    EXPECT_EQ(result->info.health.depth_images, 5);
+    ASSERT_EQ(result->info.health.skipped.size(), 2U);
+    EXPECT_EQ(result->info.health.skipped[0].file, "depth/0.100000.png");
+    EXPECT_EQ(result->info.health.skipped[1].file, "depth/0.300000.png");
+    EXPECT_THAT(result->info.health.skipped[1].reason, HasSubstr("80 x 60 pixels, expected 160 x 120"));
+    EXPECT_THAT(result->info.health.warnings, testing::Contains(HasSubstr("2 of 6 frames")));
+    ASSERT_TRUE(result->accuracy);
+    EXPECT_EQ(result->accuracy->frames, 3) << "frames 2, 4 and 5";
+  }
+  const auto refused = map("strict", strict);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("depth/0.100000.png"));
+  for (const int i : {0, 2, 4, 5}) shrink(i);
+  const auto none = map("none");
+  ASSERT_TRUE(none) << none.error().message;
+  EXPECT_FALSE(none->accuracy);
+  EXPECT_EQ(none->info.health.skipped.size(), 6U);
+  const std::string page = content_of(root_ / "none" / "report.html");
+  EXPECT_THAT(page, HasSubstr("80 x 60 pixels"));
+  EXPECT_THAT(page, HasSubstr("or none that can be used"));
 }
 
 TEST_F(MapSequence, AnExistingRunIsNotTouched) {

@@ -115,6 +115,27 @@ TEST_F(RunEvaluation, NeedsTruth) {
   EXPECT_THAT(evaluate_stack(*run, blind).error().message, HasSubstr("no true depth"));
 }
 
+TEST_F(RunEvaluation, NamesTrueDepthThatCannotBeUsed) {
+  const auto damaged = [&](int i) {
+    fs::resize_file(here_ / "sequence" / "depth" / (to_string(Time::from_seconds(i)) + ".png"), 100);
+  };
+  const io::Sequence truth = sequence(true);
+  ASSERT_TRUE(write_run(here_ / "run", truth, "depth", kSize).ok());
+  const auto run = io::read_run(here_ / "run");
+  damaged(1);
+  std::vector<io::Skipped> skipped;
+  const auto rest = evaluate_stack(*run, truth, &skipped);
+  ASSERT_TRUE(rest) << rest.error().message;
+  EXPECT_EQ(rest->frames, kFrames - 1);
+  ASSERT_EQ(skipped.size(), 1U);
+  EXPECT_EQ(skipped[0].file, "depth/1.000000.png");
+  EXPECT_FALSE(skipped[0].reason.empty());
+  for (const int i : {0, 2}) damaged(i);
+  const auto none = evaluate_stack(*run, truth);
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message, HasSubstr("depth/0.000000.png"));
+}
+
 TEST_F(RunEvaluation, NeedsTheSequenceOfTheRun) {
   const io::Sequence truth = sequence(true);
   ASSERT_TRUE(write_run(here_ / "run", truth, "depth", kSize).ok());

@@ -1,10 +1,13 @@
 // `pade convert`: a flight from a folder or a recording into a rosbag, an MCAP file or a folder.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
@@ -17,6 +20,7 @@
 #include "pade/offline/map_sequence.hpp"
 
 #include "commands.hpp"
+#include "options/own_folder.hpp"
 #include "progress.hpp"
 
 namespace pade::cli {
@@ -30,6 +34,25 @@ struct ConvertArguments {
   int camera = 0;
   bool force = false;
 };
+
+/// What io::write_flight() makes of a flight in a folder.
+constexpr std::string_view kFlightMarker = "camera.yaml";
+constexpr std::string_view kFlightWords = "# written by pade";
+constexpr std::array<std::string_view, 8> kFlightFiles = {
+    "rgb", "groundtruth.txt", kFlightMarker, "mask.png", "imu.csv", "gnss.csv", "mag.csv", "baro.csv"};
+
+/// Refuses to write where the flight itself is: it would be gone before what was made of it is looked at.
+Status check_apart(const ConvertArguments& arguments) {
+  const auto place = [](const std::string& name) {
+    std::error_code failed;
+    const fs::path path = fs::weakly_canonical(name, failed);
+    return path.has_filename() ? path : path.parent_path();  // "flight/" is "flight"
+  };
+  const fs::path way = place(arguments.in).lexically_relative(place(arguments.out));
+  if (way.empty() || *way.begin() == "..") return {};
+  return Error{fmt::format("{}: found {} in it, expected another place than that of the flight that is read",
+                           arguments.out, arguments.in)};
+}
 
 /// The sensors that lie beside the images; empty if there are none. What is there and cannot be read is said.
 std::optional<io::RecordedSensors> sensors_of(const ConvertArguments& arguments,
@@ -88,7 +111,11 @@ Result<io::WrittenFlight> write(const ConvertArguments& arguments, const io::Seq
     if (!writer) return writer.error();
     return io::write_flight(sequence, log, **writer, step);
   }
-  auto folder = io::OutputFolder::create(arguments.out, overwrite, "camera.yaml");
+  if (arguments.force) {
+    if (Status own = check_own(arguments.out, {kFlightMarker, kFlightWords, kFlightFiles}); !own)
+      return own.error();
+  }
+  auto folder = io::OutputFolder::create(arguments.out, overwrite, kFlightMarker);
   if (!folder) return folder.error();
   auto written = io::write_flight(sequence, log, *folder, step);
   if (!written) return written;
@@ -97,6 +124,7 @@ Result<io::WrittenFlight> write(const ConvertArguments& arguments, const io::Seq
 }
 
 Status convert(const ConvertArguments& arguments) {
+  if (Status apart = check_apart(arguments); !apart) return apart;
   MapSequenceOptions options;
   options.sequence.poses = arguments.poses;
   options.sequence.calibration = arguments.calibration;
@@ -147,7 +175,7 @@ void add_convert(CLI::App& app, Context& context) {
       ->check(CLI::Range(0, 99));
   command->add_option("--topics", arguments->topics,
                       "Topics of a recording that are meant where several fit, separated by blanks");
-  command->add_flag("--force", arguments->force, "Replace what is there");
+  command->add_flag("--force", arguments->force, "Replace a file, or a folder that this command wrote");
   command->callback([arguments, &context] {
     io::watch_for_interrupts();
     const Status status = convert(*arguments);

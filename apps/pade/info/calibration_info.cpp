@@ -9,6 +9,7 @@
 #include "pade/io/sequence/calibration.hpp"
 
 #include "info/info_lines.hpp"
+#include "options/json_text.hpp"
 
 namespace pade::cli {
 namespace {
@@ -52,7 +53,7 @@ Status inform_of_calibration(const fs::path& file, int camera_number, bool as_js
                     "a map (.bt, .ot)",
                     file.string())};
   if (as_json) {
-    fmt::print("{}\n", json_of(*calibration).dump(2));
+    fmt::print("{}\n", json_text(json_of(*calibration)));
     return {};
   }
   const Camera& camera = *calibration->camera;

@@ -11,6 +11,7 @@
 #include "pade/live/recordings/ulog.hpp"
 
 #include "info/info_lines.hpp"
+#include "options/json_text.hpp"
 
 namespace pade::cli {
 namespace {
@@ -139,7 +140,7 @@ Status inform_of_ulog(const std::filesystem::path& file, bool as_json) {
   if (!log) return log.error();
   const Result<NavigationLog> sensors = live::read_ulog_sensors(file);
   if (as_json) {
-    fmt::print("{}\n", ulog_json(file, *log, sensors).dump(2));
+    fmt::print("{}\n", json_text(ulog_json(file, *log, sensors)));
   } else {
     print_ulog(file, *log, sensors);
   }
@@ -152,7 +153,7 @@ Status inform_of_tlog(const std::filesystem::path& file, bool as_json) {
   const live::TlogSummary summary = live::summarise(*bytes);
   const Result<NavigationLog> sensors = live::read_tlog_sensors(file);
   if (as_json) {
-    fmt::print("{}\n", tlog_json(file, summary, sensors).dump(2));
+    fmt::print("{}\n", json_text(tlog_json(file, summary, sensors)));
   } else {
     print_tlog(file, summary, sensors);
   }

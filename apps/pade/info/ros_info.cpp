@@ -11,6 +11,7 @@
 
 #include "info/info_lines.hpp"
 #include "info/recording_info.hpp"
+#include "options/json_text.hpp"
 
 namespace pade::cli {
 namespace {
@@ -129,7 +130,7 @@ Result<bool> inform_of_ros_recording(const std::filesystem::path& file, const st
       json["problems"].push_back(sequence.error().message);
     }
   }
-  fmt::print("{}\n", json.dump(2));
+  fmt::print("{}\n", json_text(json));
   return false;
 }
 

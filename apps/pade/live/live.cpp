@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -15,9 +14,9 @@
 #include <fmt/format.h>
 
 #include "pade/io/atomic_output.hpp"
-#include "pade/io/formats/map_files.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/config.hpp"
+#include "pade/live/dds/dds_sink.hpp"
 #include "pade/live/link/filtered_poses.hpp"
 #include "pade/live/map_saver.hpp"
 #include "pade/live/recordings/session_recorder.hpp"
@@ -27,6 +26,7 @@
 #include "pade/live/web/web_server.hpp"
 
 #include "commands.hpp"
+#include "live/live_log.hpp"
 
 namespace pade::cli {
 namespace {
@@ -69,6 +69,7 @@ class LinkThread {
 /// Everything that a session is made of.
 struct LiveParts {
   live::LiveOptions options;
+  std::unique_ptr<live::DdsParts> dds;  // first: the others use it
   live::OpenCamera camera;
   std::unique_ptr<live::AutopilotLink> link;
 };
@@ -78,12 +79,19 @@ Result<LiveParts> open_parts(const LiveArguments& arguments) {
   if (!options) return options.error();
   if (const Status place = live::check_place("map", options->map); !place) return place.error();
   if (const Status place = live::check_place("record", options->record); !place) return place.error();
-  auto camera = live::open_camera(options->camera);
+  std::unique_ptr<live::DdsParts> dds;
+  if (options->needs_dds()) {
+    auto joined = live::join_dds(options->dds);
+    if (!joined) return joined.error();
+    dds = std::move(*joined);
+    say(fmt::format("dds: domain {}{}\n", dds->network->domain(),
+                    live::is_local(options->dds) ? ", this machine alone" : ""));
+  }
+  auto camera = live::open_camera(*options, dds.get());
   if (!camera) return camera.error();
-  auto port = live::open_port(options->link.port, options->link.baud);
-  if (!port) return port.error();
-  auto link = std::make_unique<live::AutopilotLink>(std::move(*port), options->link, options->navigator);
-  return LiveParts{std::move(*options), std::move(*camera), std::move(link)};
+  auto link = live::open_link(*options, camera->T_body_camera, dds.get());
+  if (!link) return link.error();
+  return LiveParts{std::move(*options), std::move(dds), std::move(*camera), std::move(*link)};
 }
 
 /// What a link carries each second against what it can, for who has to choose its speed.
@@ -116,6 +124,7 @@ Status check_parts(LiveParts& parts) {
   live::LiveFrame frame;
   bool image = false;
   live::LinkReport link;
+  const bool alone = parts.options.link.port == live::no_port;
   {
     const LinkThread thread(*parts.link, progress);
     const Time start = live::now_of_ours();
@@ -124,7 +133,7 @@ Status check_parts(LiveParts& parts) {
       constexpr int kRound = 50;  // ms
       image = parts.camera.source->next(frame, kRound) == live::FrameSource::Outcome::frame || image;
       link = parts.link->report();
-      if (image && link.synchronised && link.poses_come) break;
+      if (image && (link.synchronised || alone) && link.poses_come) break;
     }
   }
   const Camera& camera = parts.camera.source->camera();
@@ -134,14 +143,18 @@ Status check_parts(LiveParts& parts) {
   report("mounting", parts.camera.mounting_stated,
          parts.camera.mounting_stated ? "from the calibration"
                                       : "taken as looking ahead from the body's origin");
-  good = report("autopilot", link.autopilot.has_value(),
-                link.autopilot ? live::name_of(*link.autopilot)
-                               : "no HEARTBEAT at " + parts.options.link.port) &&
-         good;
-  good = report("clock", link.synchronised,
-                link.synchronised ? fmt::format("errs by at most {:.1f} ms", 1e3 * link.clock_bound)
-                                  : "no answer to TIMESYNC") &&
-         good;
+  if (alone) {
+    fmt::print("  {:<10} {:<8} {}\n", "autopilot", "none", "link.port: none: nobody gets sectors or texts");
+  } else {
+    good = report("autopilot", link.autopilot.has_value(),
+                  link.autopilot ? live::name_of(*link.autopilot)
+                                 : "no HEARTBEAT at " + parts.options.link.port) &&
+           good;
+    good = report("clock", link.synchronised,
+                  link.synchronised ? fmt::format("errs by at most {:.1f} ms", 1e3 * link.clock_bound)
+                                    : "no answer to TIMESYNC") &&
+           good;
+  }
   good =
       // Before take-off our own filter has all that it needs but for the heading.
       report("poses", link.poses_come || link.poses_missing == live::heading_unknown,
@@ -150,35 +163,35 @@ Status check_parts(LiveParts& parts) {
                                               : fmt::format("{} ({})", link.poses_missing, link.poses_summary)
                  : fmt::format("the autopilot refused {}", link.refused)) &&
       good;
-  fmt::print("  {:<10} {:<8} {}\n", "link load", "", link_load(parts.options));
+  if (!alone) fmt::print("  {:<10} {:<8} {}\n", "link load", "", link_load(parts.options));
   return good ? Status() : Status(Error{"something is missing (see above)"});
 }
 
-/// On standard error. A log that cannot be written (its disk is full, the terminal has gone) costs the log,
-/// not the flight.
-void say(const std::string& text) { (void)std::fputs(text.c_str(), stderr); }
+/// What shows how a session is asks this.
+live::HealthQuestion health_question(const LiveParts& parts, const live::Progress& progress,
+                                     const live::SharedText& stamps) {
+  return [&link = *parts.link, &progress, &stamps] {
+    live::HealthInputs inputs;
+    inputs.now = live::now_of_ours();
+    inputs.image = progress.image;
+    inputs.depth = progress.depth;
+    inputs.link = link.report();
+    inputs.missing = live::text_of(inputs.link);
+    constexpr double kLongest = 0.4;  // s
+    const bool no_image = inputs.image == 0 || seconds_between({inputs.image}, inputs.now) > kLongest;
+    if (inputs.link.missing == live::Missing::autopilot && no_image)
+      inputs.missing = live::text_of(live::Missing::camera);
+    inputs.stamps = stamps.get();
+    return inputs;
+  };
+}
 
 /// The page and Foxglove, where they are asked for.
 class Web {
  public:
-  static Result<std::unique_ptr<Web>> open(const LiveParts& parts, const live::Progress& progress) {
+  static Result<std::unique_ptr<Web>> open(const LiveParts& parts, const live::HealthQuestion& question) {
     const live::LiveOptions& options = parts.options;
     auto web = std::make_unique<Web>();
-    const auto question = [&link = *parts.link, &progress, raw = web.get()] {
-      live::HealthInputs inputs;
-      inputs.now = live::now_of_ours();
-      inputs.image = progress.image;
-      inputs.depth = progress.depth;
-      inputs.link = link.report();
-      inputs.missing = live::text_of(inputs.link);
-      constexpr double kLongest = 0.4;  // s
-      const bool no_image = inputs.image == 0 || seconds_between({inputs.image}, inputs.now) > kLongest;
-      if (inputs.link.missing == live::Missing::autopilot && no_image)
-        inputs.missing = live::text_of(live::Missing::camera);
-      const std::lock_guard lock(raw->mutex_);
-      inputs.stamps = raw->stamps_;
-      return inputs;
-    };
     web->publisher_.emplace(parts.camera.source->camera(), parts.camera.T_body_camera, options.sectors,
                             question);
     auto server = live::WebServer::start(options.web, *web->publisher_);
@@ -192,16 +205,6 @@ class Web {
     return web;
   }
   [[nodiscard]] live::Publisher& publisher() { return *publisher_; }
-  /// Now and then; the mapper's thread.
-  void maybe(const live::SessionCounts& counts, const std::string& stamps) {
-    constexpr double kPause = 0.2;  // s
-    const Time now = live::now_of_ours();
-    if (seconds_between(last_, now) < kPause) return;
-    last_ = now;
-    publisher_->take_counts(counts);
-    const std::lock_guard lock(mutex_);
-    stamps_ = stamps;
-  }
   /// For the log.
   [[nodiscard]] std::string text() const {
     const live::WebCounts counts = server_->counts();
@@ -213,39 +216,55 @@ class Web {
   }
 
  private:
-  std::mutex mutex_;
-  std::string stamps_;
-  Time last_;
   std::optional<live::Publisher> publisher_;
   std::unique_ptr<live::WebServer> server_;  // last: it uses the others
 };
 
-/// A line each five seconds, for the log.
-class LiveLog {
- public:
-  void maybe(const live::Progress& progress, const live::LinkReport& link, const std::string& stamps,
-             const Web* web) {
-    constexpr double kPause = 5;  // s
-    const Time now = live::now_of_ours();
-    if (seconds_between(last_, now) < kPause) return;
-    last_ = now;
-    const auto age = [&](std::int64_t then) {
-      return then == 0 ? std::string("none")
-                       : fmt::format("{:.2f} s old", 1e-9 * static_cast<double>(now.nanoseconds - then));
-    };
-    say(fmt::format("{}; image {}, depth {}; {} sectors sent, {} packets in, {} bad, {} gaps\n",
-                    live::text_of(link), age(progress.image), age(progress.depth), link.sectors_sent,
-                    link.in.packets, link.in.bad, link.in.gaps));
-    if (link.level_instead)
-      say("the autopilot does not know OBSTACLE_DISTANCE_3D: it gets OBSTACLE_DISTANCE (link.obstacles: "
-          "level)\n");
-    if (!stamps.empty()) say(stamps + "\n");
-    if (web != nullptr) say(web->text() + "\n");
-  }
+/// What the session shows to others, and what they say.
+struct LiveViews {
+  std::unique_ptr<Web> web;
+  std::unique_ptr<live::DdsSink> topics;
 
- private:
-  Time last_ = live::now_of_ours();
+  /// Now and then; the mapper's thread.
+  void maybe(const live::SessionCounts& counts) {
+    constexpr double kPause = 0.2;  // s
+    const Time now = live::now_of_ours();
+    if (seconds_between(last, now) < kPause) return;
+    last = now;
+    if (web) web->publisher().take_counts(counts);
+    if (topics) topics->take_counts(counts);
+  }
+  /// For the log.
+  [[nodiscard]] std::vector<std::string> texts(const live::DdsParts* dds) const {
+    std::vector<std::string> texts;
+    if (web) texts.push_back(web->text());
+    if (topics) texts.push_back(fmt::format("dds: {}", topics->text()));
+    if (dds == nullptr) return texts;
+    if (const std::string why = dds->shared.no_image.get(); !why.empty())
+      texts.push_back(fmt::format("camera: {}", why));
+    return texts;
+  }
+  Time last{};
 };
+
+Result<LiveViews> open_views(const LiveArguments& arguments, const LiveParts& parts,
+                             const live::HealthQuestion& question) {
+  LiveViews views;
+  if (arguments.web) {
+    auto opened = Web::open(parts, question);
+    if (!opened) return opened.error();
+    views.web = std::move(*opened);
+  }
+  const live::LiveOptions& options = parts.options;
+  if (!options.dds.publish) return views;
+  live::DdsSinkParts about{parts.camera.source->camera(), parts.camera.T_body_camera, options.sectors};
+  about.states_body = options.link.poses != live::PoseMessages::dds;
+  about.states_camera = options.camera.kind != live::CameraKind::dds;
+  auto topics = live::DdsSink::start(*parts.dds->network, parts.dds->shared, options.dds, about, question);
+  if (!topics) return topics.error();
+  views.topics = std::move(*topics);
+  return views;
+}
 
 /// Tells systemd that all threads get on, each second. Called by the mapper's thread, so that one that is
 /// stuck says nothing.
@@ -266,62 +285,57 @@ class Pulse {
   Time last_;
 };
 
-std::string summary(const live::SessionCounts& counts, const live::LinkReport& link) {
-  std::string text = fmt::format(
-      "{} frames: {} mapped, {} skipped, {} dropped for newer ones; {} sectors sent, {} too old to be sent\n",
-      counts.frames, counts.mapped, counts.skipped, counts.dropped, link.sectors_sent, link.sectors_stale);
-  for (const auto& [reason, count] : counts.reasons) text += fmt::format("  skipped {}: {}\n", count, reason);
-  if (counts.restarts > 0)
-    text += fmt::format("  {} maps begun anew because the poses jumped\n", counts.restarts);
-  text += fmt::format("link: {} packets, {} bad, {} gaps; {} packets of ours not taken\n", link.in.packets,
-                      link.in.bad, link.in.gaps, link.unsent);
-  return text;
-}
-
-Status save_map(const live::Session& session, const live::SaverReport& meanwhile, const std::string& file) {
-  std::string text;
-  if (!meanwhile.earlier.empty()) text += fmt::format("{}: of an earlier session\n", meanwhile.earlier);
+/// @param text  gets what is to be said of it
+Status save_map(const live::Session& session, live::MapSaver& saver, const std::string& file,
+                std::string& text) {
+  const live::SaverReport meanwhile = saver.finish();
   for (const std::string& finished : meanwhile.finished)
-    text += fmt::format("{}: until the poses jumped\n", finished);
+    text += fmt::format("{}: until a map was begun anew\n", finished);
   if (meanwhile.failed > 0) {
     say(fmt::format("{} times the map could not be saved meanwhile: {}\n", meanwhile.failed,
                     meanwhile.error));
   }
   const live::SessionCounts& counts = session.counts();
-  if (counts.mapped == 0) return Error{"nothing was mapped, so no map is saved"};
-  if (!file.empty() && counts.mapped_anew == 0) {
-    text += fmt::format("nothing was mapped since the poses jumped, so {} is not written\n", file);
-  } else if (!file.empty()) {
-    if (Status saved = io::write_map(session.map(), file, io::Overwrite::replace); !saved) return saved;
+  if (counts.mapped > 0 && counts.restarts > 0 && !meanwhile.any) {
+    text += fmt::format("nothing was mapped since the map was begun anew, so {} is not written\n", file);
+  } else if (meanwhile.any) {
+    if (Status saved = saver.write_last(session.map()); !saved) return saved;
+    const std::string earlier = saver.report().earlier;
+    if (!earlier.empty()) text += fmt::format("{}: of an earlier session\n", earlier);
     const mapping::OccupancyMap::Counts voxels = session.map().counts();
     text += fmt::format("{}: {} voxels occupied, {} free\n", file, voxels.occupied, voxels.free);
+    if (!session.origin().isZero()) text += origin_text(session) + "\n";
   }
-  (void)std::fputs(text.c_str(), stdout);
+  if (!meanwhile.any && counts.restarts == 0)
+    return Error{fmt::format("nothing was mapped, so {} is not written", file)};
   return {};
 }
 
 /// Where the recording is, or why there is none.
 std::string recorded(live::SessionRecorder& recorder) {
-  if (const Status finished = recorder.finish(); !finished) return finished.error().message + "\n";
-  const std::size_t lost = recorder.left_out();
-  return fmt::format(
-      "{}: the frames of the map{}\n", recorder.file().string(),
-      lost > 0 ? fmt::format(", without {} that the disk was too slow for", lost) : std::string());
+  const Status finished = recorder.finish();
+  const live::RecorderReport report = recorder.report();
+  if (!finished)
+    return fmt::format("{}{}\n", finished.error().message,
+                       report.left_out > 0 ? fmt::format(" ({} frames are missing)", report.left_out) : "");
+  std::string text = fmt::format("{}: the frames of the map", report.file.string());
+  if (report.left_out > 0)
+    text += fmt::format(", without {} ({})", report.left_out,
+                        report.ended.empty() ? "the disk was too slow" : report.ended);
+  return text + "\n";
 }
 
 Status run_live(const LiveArguments& arguments) {
   io::watch_for_interrupts();
   (void)std::signal(SIGHUP, SIG_IGN);  // a terminal out of radio range must not end the flight's map
+  if (!arguments.check) (void)std::signal(SIGPIPE, SIG_IGN);  // nor must whoever read its log
   auto parts = open_parts(arguments);
   if (!parts) return parts.error();
   const live::LiveOptions& options = parts->options;
   live::Progress progress;
-  std::unique_ptr<Web> web;
-  if (arguments.web) {
-    auto opened = Web::open(*parts, progress);
-    if (!opened) return opened.error();
-    web = std::move(*opened);
-  }
+  live::SharedText stamps_said;
+  auto views = open_views(arguments, *parts, health_question(*parts, progress, stamps_said));
+  if (!views) return views.error();
   if (arguments.check) return check_parts(*parts);
   const auto sight = live::SectorView::of(parts->camera.source->camera(), parts->camera.T_body_camera);
   live::SectorSink sectors(*parts->link, options.sectors, options.session.least_depth, sight);
@@ -331,18 +345,20 @@ Status run_live(const LiveArguments& arguments) {
   std::vector<live::Sink*> sinks{&sectors};
   std::optional<live::MapSaver> saver;
   if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
-  if (web) {
-    sinks.push_back(&web->publisher());
-    sectors.listener = [raw = &web->publisher()](const auto& distances, Time frame) {
-      raw->take_sectors(distances, frame);
-    };
-  }
+  if (views->web) sinks.push_back(&views->web->publisher());
+  if (views->topics) sinks.push_back(views->topics.get());
+  sectors.listener = [&shown = *views](const auto& distances, Time frame) {
+    if (shown.web) shown.web->publisher().take_sectors(distances, frame);
+    if (shown.topics) shown.topics->take_sectors(distances, frame);
+  };
   std::unique_ptr<live::SessionRecorder> recorder;
   if (!options.record.empty()) {
     const live::FrameSource& camera = *parts->camera.source;
     auto made = live::SessionRecorder::create(options.record, camera.camera(), camera.mask());
     if (!made) return made.error();
     recorder = std::move(*made);
+    for (const std::string& earlier : recorder->report().earlier)
+      say(fmt::format("{}: recorded by an earlier session\n", earlier));
   }
   auto session = live::Session::create(
       {*parts->camera.source, *parts->link, sinks, progress, parts->camera.T_body_camera, recorder.get()},
@@ -353,13 +369,16 @@ Status run_live(const LiveArguments& arguments) {
     const LinkThread thread(*parts->link, progress);
     LiveLog log;
     Pulse pulse(service, thread);
+    FileTroubles troubles(saver ? &*saver : nullptr, recorder.get());
     service.ready();
     const Time start = live::now_of_ours();
     session->run([&] {
       const std::string stamps = live::stamp_text(session->stamp_offset());
-      log.maybe(progress, parts->link->report(), stamps, web.get());
-      if (web) web->maybe(session->counts(), stamps);
+      log.maybe(progress, parts->link->report(), *session, [&] { return views->texts(parts->dds.get()); });
+      stamps_said.set(stamps);
+      views->maybe(session->counts());
       pulse.maybe(*parts->link);
+      troubles.maybe(*parts->link);
       const bool over =
           arguments.seconds > 0 && seconds_between(start, live::now_of_ours()) > arguments.seconds;
       return over || io::interrupted();
@@ -367,13 +386,12 @@ Status run_live(const LiveArguments& arguments) {
   }
   service.stopping();
   parts->link->end();
-  live::SaverReport meanwhile;
-  if (saver) meanwhile = saver->finish();
-  const Status saved = save_map(*session, meanwhile, options.map);
-  std::string text = summary(session->counts(), parts->link->report());
+  std::string text;
+  const Status saved = saver ? save_map(*session, *saver, options.map, text) : Status();
+  text += summary(session->counts(), parts->link->report());
   if (const std::string stamps = live::stamp_text(session->stamp_offset()); !stamps.empty())
     text += stamps + "\n";
-  if (web) text += web->text() + "\n";
+  for (const std::string& view : views->texts(parts->dds.get())) text += view + "\n";
   if (recorder != nullptr) text += recorded(*recorder);
   (void)std::fputs(text.c_str(), stdout);
   return saved;
@@ -388,8 +406,9 @@ void add_live(CLI::App& app, Context& context) {
   command->footer(
       "Runs until SIGTERM or Ctrl-C, saves the map meanwhile and at the end. docs/live.md has the wiring, "
       "the autopilots' parameters and the file.\n"
-      "What does not exist yet: signing, RTSP and video files, ROS, DDS.");
-  command->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map, web")
+      "What does not exist yet: signing, RTSP and video files.");
+  command
+      ->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map, web, dds")
       ->required();
   command->add_flag("--web", arguments->web,
                     "Show the session on a page and to Foxglove (section web of CONFIG)");
@@ -398,7 +417,7 @@ void add_live(CLI::App& app, Context& context) {
   command->callback([arguments, &context] {
     const Status status = run_live(*arguments);
     if (status) return;
-    fmt::print(stderr, "pade live: {}\n", status.error().message);
+    say(fmt::format("pade live: {}\n", status.error().message));
     context.exit_code = 1;
   });
 }

@@ -27,6 +27,8 @@
 
 #include "commands.hpp"
 #include "odometry.hpp"
+#include "options/json_text.hpp"
+#include "options/unused_options.hpp"
 #include "raw_gnss.hpp"
 #include "tight.hpp"
 
@@ -63,19 +65,6 @@ struct NavigateArguments {
   bool json = false;
   const CLI::App* command = nullptr;
 };
-
-/// Refuses options that were given and mean nothing here.
-Status refuse_unused(const NavigateArguments& arguments, const std::vector<std::string>& used,
-                     const char* why) {
-  for (const CLI::Option* option : arguments.command->get_options()) {
-    if (option->count() == 0 || option->get_positional()) continue;
-    const std::string name = option->get_name();
-    if (std::find(used.begin(), used.end(), name) != used.end()) continue;
-    return Error{
-        fmt::format("{}: found it with {}, expected that it is left out: it would do nothing", name, why)};
-  }
-  return {};
-}
 
 /// Lever arm, and what a calibration says of where the camera sits.
 Status set_mounting(const NavigateArguments& arguments, NavigationRunOptions& options) {
@@ -235,9 +224,9 @@ Result<CheckedLog> read_log(const NavigateArguments& arguments) {
 Status navigate(const NavigateArguments& arguments) {
   if (!arguments.raw_coupling.empty() && arguments.raw_gnss.empty() && !arguments.raw &&
       is_known_ranges(arguments.log)) {
-    const Status fits =
-        refuse_unused(arguments, {"--out", "--raw-coupling", "--elevation-mask", "--force", "--json"},
-                      "odometry and no IMU");
+    const Status fits = refuse_unused(*arguments.command,
+                                      {"--out", "--raw-coupling", "--elevation-mask", "--force", "--json"},
+                                      "odometry and no IMU");
     if (!fits) return fits;
     OdometryArguments odometry;
     odometry.log = arguments.log;
@@ -255,8 +244,9 @@ Status navigate(const NavigateArguments& arguments) {
     return navigate_odometry(odometry);
   }
   if (arguments.raw || is_raw_gnss_file(arguments.log)) {
-    const Status fits = refuse_unused(arguments, {"--out", "--raw", "--elevation-mask", "--force", "--json"},
-                                      "raw GNSS alone, without an IMU");
+    const Status fits =
+        refuse_unused(*arguments.command, {"--out", "--raw", "--elevation-mask", "--force", "--json"},
+                      "raw GNSS alone, without an IMU");
     if (!fits) return fits;
     return navigate_raw(
         {arguments.log, arguments.out, positioning_options(arguments), arguments.force, arguments.json});
@@ -313,13 +303,13 @@ Status navigate(const NavigateArguments& arguments) {
   for (const auto& [file, content] :
        {std::pair<std::string, std::string>{"trajectory.txt", format_trajectory(run)},
         {kMarker, format_relative_motion(run)},
-        {"navigation.json", json.dump(2) + "\n"},
-        {"report.html", navigation_report(title, *log, run, score, slips)}}) {
+        {"navigation.json", json_text(json) + "\n"},
+        {"report.html", navigation_report(title, *log, *options, run, score, slips)}}) {
     if (Status written = output->write(file, content); !written) return written;
   }
   if (Status committed = output->commit(); !committed) return committed;
   if (arguments.json) {
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json_text(json));
     return {};
   }
   fmt::print("{}", evaluation::to_table(hints));

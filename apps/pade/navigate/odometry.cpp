@@ -15,6 +15,8 @@
 #include "pade/navigation/gnss/raw_run.hpp"
 #include "pade/report/gnss/odometry_report.hpp"
 
+#include "options/json_text.hpp"
+
 namespace pade::cli {
 namespace {
 
@@ -176,7 +178,7 @@ Status navigate_odometry(const OdometryArguments& arguments) {
       {"residuals.csv", format_residuals(alone)},
       {"raw_report.html",
        raw_report("Raw GNSS alone, epoch by epoch", *log, alone, score_positions(*log, alone))},
-      {"navigation.json", json.dump(2) + "\n"},
+      {"navigation.json", json_text(json) + "\n"},
       {"report.html", odometry_report("Raw GNSS and odometry of " + name, *log, run, alone)}};
   if (arguments.coupling == PlanarCoupling::tight) files.emplace_back("ranges.csv", format_ranges(run));
   for (const auto& [file, content] : files) {
@@ -184,7 +186,7 @@ Status navigate_odometry(const OdometryArguments& arguments) {
   }
   if (Status committed = output->commit(); !committed) return committed;
   if (arguments.json) {
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json_text(json));
     return {};
   }
   print_run(*log, run, alone, arguments.coupling);

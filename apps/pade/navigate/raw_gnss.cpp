@@ -16,6 +16,8 @@
 #include "pade/navigation/gnss/raw_run.hpp"
 #include "pade/report/gnss/raw_gnss_report.hpp"
 
+#include "options/json_text.hpp"
+
 namespace pade::cli {
 namespace {
 
@@ -131,13 +133,13 @@ Status navigate_raw(const RawGnssArguments& arguments) {
   for (const auto& [file, content] : {std::pair<std::string, std::string>{kRawMarker, format_epochs(run)},
                                       {"residuals.csv", format_residuals(run)},
                                       {"gnss.csv", io::format_gnss(*fixes)},
-                                      {"navigation.json", json.dump(2) + "\n"},
+                                      {"navigation.json", json_text(json) + "\n"},
                                       {"report.html", raw_report(title, *log, run, score)}}) {
     if (Status written = output->write(file, content); !written) return written;
   }
   if (Status committed = output->commit(); !committed) return committed;
   if (arguments.json) {
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json_text(json));
     return {};
   }
   print_summary(*log, run, score);

@@ -24,6 +24,7 @@
 #include "pade/planning/global/route.hpp"
 #include "pade/report/plot/route_picture.hpp"
 
+#include "options/json_text.hpp"
 #include "plan/route_files.hpp"
 
 namespace pade::cli {
@@ -146,7 +147,7 @@ Status write(const PlanArguments& arguments, const Planned& planned) {
       arguments.out, arguments.force ? io::Overwrite::replace : io::Overwrite::refuse, "route.json");
   if (!folder) return folder.error();
   const auto put = [&](const char* name, const std::string& content) { return folder->write(name, content); };
-  if (Status s = put("route.json", json_of(arguments, planned).dump(2) + "\n"); !s) return s;
+  if (Status s = put("route.json", json_text(json_of(arguments, planned)) + "\n"); !s) return s;
   if (Status s = put("route.txt", route_tum(planned.route)); !s) return s;
   if (Status s = put("route.csv", route_csv(planned.route)); !s) return s;
   if (Status s = put("route.svg", planned.picture); !s) return s;
@@ -182,7 +183,7 @@ void run(PlanArguments& arguments, Context& context) {
     return;
   }
   if (arguments.json) {
-    fmt::print("{}\n", json_of(arguments, *planned).dump(2));
+    fmt::print("{}\n", json_text(json_of(arguments, *planned)));
   } else {
     print(arguments, *planned);
   }

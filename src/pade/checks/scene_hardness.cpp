@@ -76,16 +76,21 @@ SceneHardness scene_hardness(const cv::Mat& image, const cv::Mat& depth) {
 
 Result<SceneHardness> scene_hardness(const io::Sequence& sequence, int frames) {
   SceneHardness total;
+  std::string first_reason;
   const std::size_t step =
       std::max<std::size_t>(1, sequence.size() / static_cast<std::size_t>(std::max(frames, 1)));
   for (std::size_t i = 0; i < sequence.size(); i += step) {
     const Result<cv::Mat> depth = sequence.truth(i);
-    if (!depth) continue;
+    if (!depth) {
+      if (first_reason.empty()) first_reason = "; first: " + depth.error().message;
+      continue;
+    }
     const auto frame = sequence.frame(i);
     if (frame) total += scene_hardness(frame->image, *depth);
   }
   if (total.pixels == 0)
-    return Error{fmt::format("{}: found no frame with true depth, expected one", sequence.folder().string())};
+    return Error{fmt::format("{}: found no frame with true depth that can be used, expected one{}",
+                             sequence.folder().string(), first_reason)};
   return total;
 }
 

@@ -1,6 +1,7 @@
 #include "pade/checks/sequence_check.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -85,19 +86,22 @@ class PairReader {
     if (!first || !second) return;
     PoseCheckPair pair{grey_of(first->image),
                        grey_of(second->image),
-                       first->T_world_camera,
-                       second->T_world_camera,
+                       as_written(first->T_world_camera),
+                       as_written(second->T_world_camera),
                        {},
                        {},
                        {}};
-    if (older > 0) pair.rows_before = {sequence_.pose(newer - 1), sequence_.pose(older - 1)};
-    if (newer + 1 < sequence_.size())
-      pair.rows_after = {sequence_.pose(newer + 1), sequence_.pose(older + 1)};
-    if (sequence_.has_truth()) {
+    if (older > 0) pair.rows_before = rows(newer - 1, older - 1);
+    if (newer + 1 < sequence_.size()) pair.rows_after = rows(newer + 1, older + 1);
+    if (!sequence_.depth_file(newer).empty()) {
+      ++truths_;
       if (Result<cv::Mat> truth = sequence_.truth(newer)) {
         pair.depth = std::move(truth).value();
         measure_truth(pair.depth,
                       relative_motion(sequence_.pose(newer), sequence_.pose(older), -1).t_reference_other);
+      } else {
+        ++bad_truths_;
+        if (first_bad_truth_.empty()) first_bad_truth_ = truth.error().message;
       }
     }
     pairs_.push_back(std::move(pair));
@@ -106,6 +110,11 @@ class PairReader {
   [[nodiscard]] const std::vector<PoseCheckPair>& pairs() const { return pairs_; }
 
   void finish() const {
+    if (bad_truths_ > 0) {
+      check_.warnings.push_back(
+          fmt::format("{} of {} depth images that were looked at cannot be used; first: {}", bad_truths_,
+                      truths_, first_bad_truth_));
+    }
     if (looked_at_ == 0) return;
     check_.truth_coverage = static_cast<double>(depths_.count()) / static_cast<double>(looked_at_);
     check_.truth_depth = Spread{depths_.quantile(0.01), depths_.median(), depths_.quantile(0.99)};
@@ -113,6 +122,16 @@ class PairReader {
   }
 
  private:
+  // With the local origin back in it: a mistake such as poses that are inverted is one of the rows as they
+  // are.
+  [[nodiscard]] Pose as_written(Pose pose) const {
+    pose.translation += sequence_.local_origin();
+    return pose;
+  }
+  [[nodiscard]] std::array<Pose, 2> rows(std::size_t newer, std::size_t older) const {
+    return {as_written(sequence_.pose(newer)), as_written(sequence_.pose(older))};
+  }
+
   void measure_truth(const cv::Mat& depth, const Eigen::Vector3d& t) {
     for_each_grid_pixel(sequence_.camera(), [&](int u, int v) {
       ++looked_at_;
@@ -127,6 +146,8 @@ class PairReader {
   SequenceCheck& check_;
   std::vector<PoseCheckPair> pairs_;
   std::uint64_t looked_at_ = 0;
+  std::size_t truths_ = 0, bad_truths_ = 0;
+  std::string first_bad_truth_;
   LogHistogram depths_, parallax_;
 };
 
@@ -167,9 +188,12 @@ void warn(const io::Sequence& sequence, SequenceCheck& check) {
   }
   const double parallax = check.parallax.value_or(check.parallax_at_5_metres);
   if (parallax < kLeastParallax) {
-    check.warnings.push_back(fmt::format(
-        "the parallax is only {:.1f} px: pair frames farther apart, with --step {}", parallax,
-        std::clamp(static_cast<int>(std::ceil(check.step * 4 / std::max(parallax, 0.1))), 2, 20)));
+    const int wanted = static_cast<int>(std::ceil(check.step * 4 / std::max(parallax, 0.1)));
+    const int step = std::min(std::clamp(wanted, 2, 20), static_cast<int>(sequence.size()) - 1);
+    check.warnings.push_back(
+        fmt::format("the parallax is only {:.1f} px: {}", parallax,
+                    step > check.step ? fmt::format("pair frames farther apart, with --step {}", step)
+                                      : "the camera hardly moves, and no frames farther apart would help"));
   }
   if (parallax > kLargestParallax) {
     check.warnings.push_back(

@@ -162,7 +162,10 @@ DepthAccuracy average(std::span<const DepthAccuracy> sequences) {
   DepthAccuracy mean;
   if (sequences.empty()) return mean;
   mean.max_depth = sequences.front().max_depth;
-  for (const DepthAccuracy& sequence : sequences) mean.frames += sequence.frames;
+  for (const DepthAccuracy& sequence : sequences) {
+    mean.frames += sequence.frames;
+    if (sequence.max_depth != mean.max_depth) mean.max_depth = std::numeric_limits<double>::quiet_NaN();
+  }
   for (std::size_t i = 0; i < range_count; ++i) {
     mean.ranges[i] = average_range(
         sequences, [i](const DepthAccuracy& one) -> const RangeAccuracy& { return one.ranges[i]; });

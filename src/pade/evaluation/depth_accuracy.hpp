@@ -51,7 +51,7 @@ struct RangeAccuracy {
 /// The accuracy of a run.
 struct DepthAccuracy {
   int frames = 0;        ///< depth images that had truth
-  double max_depth = 0;  ///< metres; estimates beyond counted as no depth. 0 = no limit
+  double max_depth = 0;  ///< metres; estimates beyond counted as no depth. 0 = no limit, NaN = several
   std::array<RangeAccuracy, range_count> ranges;
   RangeAccuracy all;  ///< all ranges pooled
 };
@@ -96,7 +96,7 @@ class Accumulator {
 cv::Mat relative_error(const DepthImage& estimate, const cv::Mat& truth);
 
 /// The mean over several sequences of each figure, sequences that have no value for it left out; counts are
-/// summed.
+/// summed. `max_depth` is NaN where theirs differ: then the figures are of different things.
 DepthAccuracy average(std::span<const DepthAccuracy> sequences);
 
 }  // namespace pade::evaluation

@@ -42,7 +42,12 @@ cv::Mat flow_from_depth(const Camera& camera, const cv::Mat& depth, const Pose& 
   return flow;
 }
 
-Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, int step, int count) {
+Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, int step, int count,
+                                                 std::vector<io::Skipped>* skipped) {
+  std::vector<io::Skipped> bad;
+  const auto skip = [&](const std::filesystem::path& file, const Error& error) {
+    if (!file.empty()) bad.push_back(io::skipped_in(sequence.folder(), file.string(), error.message));
+  };
   const std::string name = sequence.folder().string();
   if (!sequence.has_truth()) return Error{fmt::format("{}: a sequence without true depth", name)};
   const auto stride = static_cast<std::size_t>(std::max(step, 1));
@@ -54,6 +59,9 @@ Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, i
     const Result<Frame> first = sequence.frame(frame);
     const Result<Frame> second = sequence.frame(frame + stride);
     const Result<cv::Mat> depth = sequence.truth(frame);
+    if (!first) skip(sequence.image_file(frame), first.error());
+    if (!second) skip(sequence.image_file(frame + stride), second.error());
+    if (!depth) skip(sequence.depth_file(frame), depth.error());
     if (!first || !second || !depth) continue;
     cv::Mat truth =
         flow_from_depth(sequence.camera(), *depth, sequence.pose(frame), sequence.pose(frame + stride));
@@ -66,8 +74,10 @@ Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, i
     pairs.push_back({frame, grey(first->image), grey(second->image), std::move(truth)});
   }
   if (pairs.empty()) {
-    return Error{fmt::format("{}: no two frames {} apart with true depth of what both see", name, stride)};
+    return Error{fmt::format("{}: no two frames {} apart with true depth of what both see{}", name, stride,
+                             bad.empty() ? "" : fmt::format("; first: {}: {}", bad[0].file, bad[0].reason))};
   }
+  if (skipped != nullptr) *skipped = std::move(bad);
   return pairs;
 }
 

@@ -32,6 +32,8 @@ struct RecordedPair {
 /// Up to `count` pairs (i, i + step) spread evenly over a sequence with true depth. Frames whose pixels or
 /// depth cannot be read, and pairs that see nothing in common, are passed over; an error if there is no
 /// pair at all.
-Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, int step, int count);
+/// @param skipped  if given, gets what could not be read, with the reason
+Result<std::vector<RecordedPair>> recorded_pairs(const io::Sequence& sequence, int step, int count,
+                                                 std::vector<io::Skipped>* skipped = nullptr);
 
 }  // namespace pade::evaluation

@@ -11,6 +11,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "pade/io/lasting_output.hpp"
+
 namespace pade::io {
 namespace fs = std::filesystem;
 namespace {
@@ -43,6 +45,9 @@ Result<fs::path> resolve(const fs::path& path) {
   return resolved;
 }
 
+/// Whether a call that waits for the disk has failed. Pipes and some file systems have no disk to wait for.
+bool sync_failed(int result) { return result != 0 && errno != EINVAL && errno != ENOTSUP && errno != EROFS; }
+
 /// A file that is being written, small pieces gathered to larger ones. The first error stays and ends it.
 class FileWriter {
  public:
@@ -64,6 +69,12 @@ class FileWriter {
     } else {
       gathered_ += piece;
     }
+  }
+
+  /// Waits until all is on the disk.
+  void sync() {
+    flush();
+    if (status_ && sync_failed(::fdatasync(file_))) fail();
   }
 
   Status close() {
@@ -96,9 +107,10 @@ class FileWriter {
   Status status_;
 };
 
-Status write_bytes(const fs::path& path, const ByteSource& content, int flags) {
+Status write_bytes(const fs::path& path, const ByteSource& content, int flags, bool lasting = false) {
   FileWriter file(path, flags);
   content([&](std::string_view piece) { file.add(piece); });
+  if (lasting) file.sync();
   return file.close();
 }
 
@@ -264,7 +276,9 @@ Status write_file(const fs::path& path, std::string_view content, Overwrite over
   return write_file(path, source_of(content), overwrite);
 }
 
-Status write_file(const fs::path& path, const ByteSource& content, Overwrite overwrite) {
+namespace {
+
+Status write_whole(const fs::path& path, const ByteSource& content, Overwrite overwrite, bool lasting) {
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
   if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
@@ -280,13 +294,33 @@ Status write_file(const fs::path& path, const ByteSource& content, Overwrite ove
   const Result<fs::path> target = resolve(path);
   if (!target) return target.error();
   const fs::path temporary = temporary_beside(*target);
-  Status written = write_bytes(temporary, content, O_CREAT | O_EXCL);
+  Status written = write_bytes(temporary, content, O_CREAT | O_EXCL, lasting);
   if (written) {
     fs::rename(temporary, *target, code);
     if (code) written = os_error(*target, "cannot be put in place", code.value());
   }
   if (!written) fs::remove(temporary, code);
+  if (written && lasting) written = sync_to_disk(target->parent_path());
   return written;
+}
+
+}  // namespace
+
+Status write_file(const fs::path& path, const ByteSource& content, Overwrite overwrite) {
+  return write_whole(path, content, overwrite, false);
+}
+
+Status write_lasting_file(const fs::path& path, const ByteSource& content) {
+  return write_whole(path, content, Overwrite::replace, true);
+}
+
+Status sync_to_disk(const fs::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return {};  // that may not be read: the system writes it all the same, later
+  const bool failed = sync_failed(::fsync(file));
+  const int number = errno;
+  ::close(file);
+  return failed ? Status(os_error(path, "cannot be put on the disk", number)) : Status();
 }
 
 }  // namespace pade::io

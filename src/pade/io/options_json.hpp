@@ -20,17 +20,19 @@ namespace pade::io {
 
 /// An enumeration behind its names.
 struct EnumField {
-  std::function<std::string_view()> get;
+  std::function<std::string_view()> get;      ///< name of the value
   std::function<bool(std::string_view)> set;  ///< false if the name does not exist
-  std::vector<std::string_view> names;
+  std::vector<std::string_view> names;        ///< of all values
 };
 
 /// One field of an options struct: its name, what it means, and where its value lives.
 struct OptionField {
-  std::string name;
-  std::string help;
+  std::string name;  ///< in files
+  std::string help;  ///< for a person
+  /// Where it lives; of a nested struct its fields.
   std::variant<bool*, int*, double*, std::string*, EnumField, std::vector<OptionField>> value;
 };
+/// All fields of an options struct.
 using OptionFields = std::vector<OptionField>;
 
 /// The fields of `options` in the order of its visit(). They point into `options`, which must outlive them.
@@ -77,6 +79,7 @@ concept CheckedOptions = OptionStruct<Options> && requires(const Options& option
   { check(options) } -> std::same_as<Status>;
 };
 
+/// @{
 /// Sets the fields that a YAML (or JSON) mapping names; the others keep their values. Refused, with nothing
 /// changed: text that is not a mapping, an unknown field, a value of another type, and, of an options struct,
 /// a number that its check() refuses. `file` is what messages call the text.
@@ -93,5 +96,6 @@ Status from_yaml(std::string_view text, std::string_view file, Options& options)
   options = std::move(copy);
   return {};
 }
+/// @}
 
 }  // namespace pade::io

@@ -1,6 +1,7 @@
 // What a reader passed over and why: the entries of the health report.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,5 +17,15 @@ struct ReadReport {
 
   void skip(std::string file, std::string reason) { skipped.push_back({std::move(file), std::move(reason)}); }
 };
+
+/// What is said of a file that cannot be used: its name relative to `folder` where it lies inside, and the
+/// message without that name before it.
+inline Skipped skipped_in(const std::filesystem::path& folder, std::string file, std::string reason) {
+  const std::string prefix = (folder / "").string();
+  if (file.starts_with(prefix)) file.erase(0, prefix.size());
+  for (const std::string& named : {prefix + file + ": ", file + ": "})
+    if (reason.starts_with(named)) reason.erase(0, named.size());
+  return {std::move(file), std::move(reason)};
+}
 
 }  // namespace pade::io

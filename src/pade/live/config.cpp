@@ -1,6 +1,9 @@
 #include "pade/live/config.hpp"
 
+#include <optional>
+
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "pade/core/option_check.hpp"
@@ -9,6 +12,9 @@
 #include "pade/io/text.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/camera/v4l2_source.hpp"
+#include "pade/live/dds/dds_camera.hpp"
+#include "pade/live/dds/dds_poses.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
 namespace pade::live {
 namespace {
@@ -19,6 +25,32 @@ namespace fs = std::filesystem;
 fs::path calibration_of(const CameraOptions& options) {
   if (!options.calibration.empty()) return options.calibration;
   return options.kind == CameraKind::folder ? fs::path(options.path) / "camera.yaml" : fs::path();
+}
+
+/// Of a topic that has no calibration the lens that it tells itself.
+Result<std::unique_ptr<FrameSource>> open_topic(const LiveOptions& options, std::optional<Camera> camera,
+                                                DdsParts& dds) {
+  const std::string& topic = options.camera.path;
+  if (!camera) {
+    constexpr double kPatience = 10;  // s
+    auto told = await_camera_info(*dds.network, options.dds.camera_info, topic, kPatience);
+    if (!told) return told.error();
+    camera = *told;
+  }
+  return open_dds_camera(*dds.network, dds.shared, topic, *camera);
+}
+
+Result<std::unique_ptr<FrameSource>> open_source(const LiveOptions& options,
+                                                 const std::optional<Camera>& camera, DdsParts* dds) {
+  switch (options.camera.kind) {
+    case CameraKind::folder:
+      return open_folder(options.camera.path, options.camera.calibration);
+    case CameraKind::v4l2:
+      return open_v4l2(options.camera.path, camera.value_or(Camera{}), options.camera.rate);
+    case CameraKind::dds:
+      return open_topic(options, camera, *dds);
+  }
+  return Error{"camera.kind: found none"};
 }
 
 }  // namespace
@@ -35,6 +67,18 @@ Status check(const LiveOptions& options) {
   if (const Status status = check(options.session); !status) return status;
   if (const Status status = check(options.sectors); !status) return status;
   if (const Status status = check(options.web); !status) return status;
+  if (const Status status = check(options.dds); !status) return status;
+  if (!options.needs_dds() && io::json_of(options.dds) != io::json_of(DdsOptions{}))
+    return Error{
+        "dds: found options, but nothing uses them, expected dds.publish: true, camera.kind: dds or "
+        "link.poses: dds"};
+  if (options.link.port == no_port && options.link.poses != PoseMessages::dds)
+    return Error{
+        fmt::format("link.port: found none with link.poses: {}, expected an autopilot, or poses: dds",
+                    to_name(options.link.poses))};
+  if (options.camera.kind == CameraKind::dds && !is_topic(options.camera.path))
+    return Error{fmt::format("camera.path: found \"{}\", expected a topic such as /camera/image_raw",
+                             options.camera.path)};
   const bool known = options.map.empty() || options.map.ends_with(".bt") || options.map.ends_with(".ot");
   if (!known)
     return Error{fmt::format("map: found \"{}\", expected a name that ends in .bt or .ot", options.map)};
@@ -53,7 +97,14 @@ Status check(const LiveOptions& options) {
         "navigator.filter.raw_gnss, camera: found one that is on, expected both off: an autopilot sends "
         "neither raw "
         "GNSS nor the motions of a camera"};
-  return within("mapper", check(options.mapper));
+  if (const Status status = within("mapper", check(options.mapper)); !status) return status;
+  const double reach = options.mapper.map.voxel * mapping::kTreeCentre / 2;
+  if (options.sectors.max_distance > reach)
+    return Error{
+        fmt::format("sectors.max_distance: found {}, expected at most {:.3g} m: a map of voxels of {} m "
+                    "reaches no farther",
+                    options.sectors.max_distance, reach, options.mapper.map.voxel)};
+  return {};
 }
 
 Status check_place(const std::string& field, const std::string& file) {
@@ -73,16 +124,30 @@ Result<LiveOptions> read_live_options(const fs::path& file) {
   if (!text) return text.error();
   LiveOptions options;
   if (const Status status = io::from_yaml(*text, file.string(), options); !status) return status.error();
+  for (std::string* const input : {&options.camera.path, &options.camera.calibration}) {
+    if (!input->empty()) *input = (file.parent_path() / *input).string();  // an absolute one stays
+  }
   return options;
 }
 
-Result<OpenCamera> open_camera(const CameraOptions& options) {
+Result<std::unique_ptr<DdsParts>> join_dds(const DdsOptions& options) {
+  auto parts = std::make_unique<DdsParts>(options);
+  auto network = DdsNetwork::open(options);
+  if (!network) return network.error();
+  parts->network = std::move(*network);
+  return parts;
+}
+
+Result<OpenCamera> open_camera(const LiveOptions& live, DdsParts* dds) {
+  const CameraOptions& options = live.camera;
   OpenCamera opened;
   opened.T_body_camera.rotation = Eigen::Quaterniond(forward_camera_rotation());
   const fs::path file = calibration_of(options);
   std::error_code code;
   const bool any = fs::exists(file, code);
-  if (!any && options.kind == CameraKind::v4l2) {
+  const bool needed =
+      options.kind == CameraKind::v4l2 || (options.kind == CameraKind::dds && !options.calibration.empty());
+  if (!any && needed) {
     return Error{fmt::format("camera.calibration: found no file \"{}\", expected the calibration of {}",
                              file.string(), options.path)};
   }
@@ -96,12 +161,21 @@ Result<OpenCamera> open_camera(const CameraOptions& options) {
     opened.T_body_camera = *calibration.T_body_camera;
     opened.mounting_stated = true;
   }
-  auto source = options.kind == CameraKind::folder
-                    ? open_folder(options.path, options.calibration)
-                    : open_v4l2(options.path, calibration.camera.value_or(Camera{}), options.rate);
+  auto source = open_source(live, calibration.camera, dds);
   if (!source) return source.error();
   opened.source = std::move(*source);
   return opened;
+}
+
+Result<std::unique_ptr<AutopilotLink>> open_link(const LiveOptions& options, const Pose& T_body_camera,
+                                                 DdsParts* dds) {
+  auto port = open_port(options.link.port, options.link.baud);
+  if (!port) return port.error();
+  if (options.link.poses != PoseMessages::dds)
+    return std::make_unique<AutopilotLink>(std::move(*port), options.link, options.navigator);
+  auto poses = DdsPoses::open(*dds->network, dds->shared, options.dds, T_body_camera);
+  if (!poses) return poses.error();
+  return std::make_unique<AutopilotLink>(std::move(*port), options.link, std::move(*poses));
 }
 
 }  // namespace pade::live

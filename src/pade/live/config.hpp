@@ -10,6 +10,9 @@
 
 #include "pade/core/options.hpp"
 #include "pade/core/result.hpp"
+#include "pade/live/dds/dds_options.hpp"
+#include "pade/live/dds/dds_shared.hpp"
+#include "pade/live/dds/network.hpp"
 #include "pade/live/interfaces.hpp"
 #include "pade/live/link/autopilot_link.hpp"
 #include "pade/live/sectors.hpp"
@@ -23,20 +26,23 @@ namespace pade::live {
 enum class CameraKind : std::uint8_t {
   folder,  ///< a recorded sequence at its real pace
   v4l2,    ///< a camera of the kernel's video interface
+  dds,     ///< a topic of ROS 2
 };
 
 /// Of the camera.
 struct CameraOptions {
   CameraKind kind = CameraKind::v4l2;
-  std::string path = "/dev/video0";  ///< device or folder
-  std::string calibration;           ///< file (docs/formats.md); empty: the folder's own
+  std::string path = "/dev/video0";  ///< device, folder or topic
+  std::string calibration;           ///< file (docs/formats.md); empty: the folder's own, or dds.camera_info
   double rate = 15;                  ///< frames per second that a device is asked for
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("kind", self.kind, "v4l2, or folder: a recorded sequence at its real pace");
-    field("path", self.path, "device or folder");
-    field("calibration", self.calibration, "file with lens and mounting; empty: the folder's own");
+    field("kind", self.kind, "v4l2; folder: a recorded sequence at its real pace; dds: a topic of ROS 2");
+    field("path", self.path,
+          "device, folder or topic; one that ends in /compressed has sensor_msgs/CompressedImage");
+    field("calibration", self.calibration,
+          "file with lens and mounting; empty: the folder's own, or the lens of dds.camera_info");
     field("rate", self.rate, "frames per second that a device is asked for");
   }
 };
@@ -60,6 +66,12 @@ struct LiveOptions {
   double autosave = 10;        ///< s between one save and the next; 0: only at the end
   std::string record;          ///< MCAP file of what is mapped; empty: none
   WebOptions web;
+  DdsOptions dds;
+
+  /// Whether anything of it speaks DDS.
+  [[nodiscard]] bool needs_dds() const {
+    return dds.publish || camera.kind == CameraKind::dds || link.poses == PoseMessages::dds;
+  }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -73,6 +85,7 @@ struct LiveOptions {
     field("autosave", self.autosave, "between one save and the next, s; 0 = only at the end");
     field("record", self.record, "file (.mcap, .bag) that what is mapped is recorded in; empty: none");
     field("web", self.web, "the page and Foxglove, with --web");
+    field("dds", self.dds, "topics of ROS 2, in and out");
   }
 };
 /// Refuses numbers that make no sense (core/option_check.hpp).
@@ -83,7 +96,9 @@ Status check(const LiveOptions& options);
 /// @param file   empty: none is written
 Status check_place(const std::string& field, const std::string& file);
 
-/// Reads the YAML of a session. Errors name file, line and field.
+/// Reads the YAML of a session. Errors name file, line and field. What is read (camera.calibration,
+/// camera.path) lies beside the file where its name is relative; what is written goes to the folder in which
+/// the program runs.
 Result<LiveOptions> read_live_options(const std::filesystem::path& file);
 
 /// A camera, and where it sits.
@@ -92,13 +107,30 @@ struct OpenCamera {
   Pose T_body_camera;
   bool mounting_stated = false;  ///< else it looks ahead from the body's origin
 };
+/// What speaks DDS in a session.
+struct DdsParts {
+  explicit DdsParts(const DdsOptions& options) : shared(options) {}
+  DdsShared shared;
+  std::unique_ptr<DdsNetwork> network;
+};
+/// Errors: those of DdsNetwork::open.
+Result<std::unique_ptr<DdsParts>> join_dds(const DdsOptions& options);
+
 /// Errors: the camera or its calibration cannot be used.
-Result<OpenCamera> open_camera(const CameraOptions& options);
+/// @param dds  of a session that needs it, else null; must outlive the camera
+Result<OpenCamera> open_camera(const LiveOptions& options, DdsParts* dds);
+
+/// The talk with the autopilot, or none, with poses from where the options say. Errors: those of open_port
+/// and of DdsPoses::open.
+/// @param dds  as above; must outlive the link
+Result<std::unique_ptr<AutopilotLink>> open_link(const LiveOptions& options, const Pose& T_body_camera,
+                                                 DdsParts* dds);
 
 }  // namespace pade::live
 
 template <>
 struct pade::EnumNames<pade::live::CameraKind> {
   static constexpr std::array names = {std::pair{pade::live::CameraKind::folder, std::string_view("folder")},
-                                       std::pair{pade::live::CameraKind::v4l2, std::string_view("v4l2")}};
+                                       std::pair{pade::live::CameraKind::v4l2, std::string_view("v4l2")},
+                                       std::pair{pade::live::CameraKind::dds, std::string_view("dds")}};
 };

@@ -94,7 +94,7 @@ class InputSink {
   virtual ~InputSink() = default;
 
   virtual void take(const MapperInput& input) = 0;
-  /// The poses have jumped: what comes now is another map.
+  /// As Sink::begin_anew(): what comes now is another map.
   virtual void begin_anew() = 0;
 };
 
@@ -109,7 +109,8 @@ class Sink {
   virtual void take(const LiveUpdate& update) = 0;
   /// A frame that the map has nothing of: without a pose or a partner, or unusable.
   virtual void pass(const LiveFrame& /*frame*/) {}
-  /// The poses have jumped: what comes from now on is in another world, and the map is empty.
+  /// The poses have jumped, or the vehicle has come too far: what comes from now on is in another world, and
+  /// the map is empty.
   virtual void begin_anew() {}
 };
 

@@ -7,10 +7,20 @@
 #include <fmt/format.h>
 
 #include "pade/io/formats/map_files.hpp"
+#include "pade/io/lasting_output.hpp"
+#include "pade/mapping/query/tile_tree.hpp"
 
 namespace pade::live {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+io::MapFormat format_of(const fs::path& file) {
+  return file.extension() == ".ot" ? io::MapFormat::ot : io::MapFormat::bt;
+}
+
+}  // namespace
 
 MapSaver::MapSaver(fs::path file, double every)
     : file_(std::move(file)), every_(every), thread_([this] { work(); }) {}
@@ -24,15 +34,22 @@ SaverReport MapSaver::finish() {
   }
   changed_.notify_one();
   if (thread_.joinable()) thread_.join();
-  if (any_) keep_earlier();
-  return report();
+  SaverReport done = report();
+  done.any = last_ != nullptr;
+  return done;
+}
+
+Status MapSaver::write_last(const mapping::OccupancyMap& map) {
+  if (Status status = keep_earlier(); !status) return status;
+  return io::write_lasting_file(file_, io::encode_map(map, format_of(file_)));
 }
 
 void MapSaver::take(const LiveUpdate& update) {
+  const mapping::TileBounds& known = update.view->tiles().bounds;
+  if (known.first[0] > known.last[0]) return;
   const std::lock_guard lock(mutex_);
   last_ = update.view;
   newest_ = update.view;
-  any_ = true;
 }
 
 void MapSaver::begin_anew() {
@@ -83,19 +100,26 @@ fs::path MapSaver::free_name() const {
 }
 
 /// Before the first map of this session takes its name.
-void MapSaver::keep_earlier() {
+Status MapSaver::keep_earlier() {
   std::error_code failed;
-  if (std::exchange(kept_earlier_, true) || !fs::is_regular_file(file_, failed)) return;
-  const fs::path numbered = free_name();
-  fs::rename(file_, numbered, failed);
-  const std::lock_guard lock(mutex_);
-  if (!failed) report_.earlier = numbered.string();
+  if (kept_earlier_) return {};
+  if (fs::is_regular_file(file_, failed)) {
+    const fs::path numbered = free_name();
+    fs::rename(file_, numbered, failed);
+    if (failed)
+      return Error{fmt::format("{}: the map of an earlier session cannot be moved to {}: {}", file_.string(),
+                               numbered.filename().string(), failed.message())};
+    const std::lock_guard lock(mutex_);
+    report_.earlier = numbered.string();
+  }
+  kept_earlier_ = true;
+  return {};
 }
 
 void MapSaver::save(const View& view, bool is_finished) {
-  if (!is_finished) keep_earlier();
   const fs::path file = is_finished ? free_name() : file_;
-  const Status status = io::write_map(*view, file, io::Overwrite::replace);
+  Status status = is_finished ? Status() : keep_earlier();
+  if (status) status = io::write_lasting_file(file, io::encode_map(*view, format_of(file)));
   const std::lock_guard lock(mutex_);
   if (!status) {
     ++report_.failed;

@@ -11,7 +11,9 @@
 #include <thread>
 #include <vector>
 
+#include "pade/core/result.hpp"
 #include "pade/live/interfaces.hpp"
+#include "pade/mapping/occupancy_map.hpp"
 #include "pade/mapping/query/map_view.hpp"
 
 namespace pade::live {
@@ -21,13 +23,15 @@ struct SaverReport {
   std::size_t saved = 0;              ///< times that a map was written
   std::size_t failed = 0;             ///< times that it could not be
   std::string error;                  ///< of the last failure
-  std::vector<std::string> finished;  ///< files of maps that ended because the poses jumped
+  std::vector<std::string> finished;  ///< files of maps that ended because another was begun
   std::string earlier;                ///< where the map of an earlier session went; empty: there was none
+  bool any = false;                   ///< finish(): something is known of the map as it is
 };
 
-/// Writes the newest view of the map now and then, in a thread of its own: whoever offers one never waits. A
-/// file is replaced as a whole or not at all, and only by the map that it already holds: those of earlier
-/// sessions and of before a jump of the poses stay, under the first free number (map-1.bt, map-2.bt, ...).
+/// Writes the newest view of the map now and then, on the disk itself, in a thread of its own: whoever offers
+/// one never waits. A file is replaced as a whole or not at all, and only by the map that it already holds:
+/// those of earlier sessions and of before a jump of the poses stay, under the first free number (map-1.bt,
+/// map-2.bt, ...).
 class MapSaver : public Sink {
  public:
   /// @param file   .bt or .ot
@@ -36,9 +40,13 @@ class MapSaver : public Sink {
   MapSaver(std::filesystem::path file, double every);
   ~MapSaver() override;
   /// Ends what is being written and maps that have ended, then the thread. The newest view is left to whoever
-  /// saves the map at the end.
+  /// saves the map at the end: by write_last().
   SaverReport finish();
+  /// Writes the map as it is at the end, after finish(). Errors: it cannot be written, or the map of an
+  /// earlier session cannot be moved out of its way.
+  Status write_last(const mapping::OccupancyMap& map);
 
+  /// Views in which nothing is known are none.
   void take(const LiveUpdate& update) override;
   /// The map so far goes to a file of its own.
   void begin_anew() override;
@@ -49,7 +57,7 @@ class MapSaver : public Sink {
   void work();
   void save(const View& view, bool is_finished);
   [[nodiscard]] std::filesystem::path free_name() const;
-  void keep_earlier();
+  Status keep_earlier();
 
   std::filesystem::path file_;
   double every_;
@@ -58,7 +66,6 @@ class MapSaver : public Sink {
   View newest_;              // since the last save
   View last_;                // of the map as it is
   std::vector<View> ended_;  // maps that ended, to be saved
-  bool any_ = false;         // a view was offered
   bool kept_earlier_ = false;
   bool over_ = false;
   SaverReport report_;

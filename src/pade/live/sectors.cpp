@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pade/core/option_check.hpp"
+#include "pade/live/reach.hpp"
 #include "pade/mapping/query/tile_tree.hpp"
 #include "pade/mapping/query/voxel_grid.hpp"
 
@@ -202,10 +203,13 @@ std::array<std::uint16_t, kBins> obstacle_distances(const mapping::MapView& view
                                                     const SectorOptions& options, const SectorView& sight) {
   const mapping::TileTree& tiles = view.tiles();
   Bins bins(T_world_body, tiles.voxel, options, sight);
-  const Vector3d& place = T_world_body.translation;
-  const double reach = options.max_distance;
-  const VoxelIndex low = mapping::voxel_beside(place - Vector3d(reach, reach, options.below), tiles.voxel);
-  const VoxelIndex high = mapping::voxel_beside(place + Vector3d(reach, reach, options.above), tiles.voxel);
+  const auto reach = Reach::around(T_world_body.translation, options, tiles.voxel);
+  if (!reach) {
+    std::array<std::uint16_t, kBins> unknown{};
+    unknown.fill(kUnknownDistance);
+    return unknown;
+  }
+  const VoxelIndex &low = reach->low, &high = reach->high;
   static const Tile kBeyond;
   for (const Column& column : columns_between(low, high)) {
     const VoxelIndex corner{8 * column.x, 8 * column.y, 0};

@@ -60,7 +60,7 @@ struct SectorView {
 /// 45° face of its middle, loses an obstacle. `max_distance` + 1 is sent only where every voxel of the bin
 /// was seen and is free; else, without an obstacle, kUnknownDistance. What lies outside the view does not
 /// count: what the map remembers there may be old. So bins outside it are unknown, and those at its edge are
-/// never free.
+/// never free. Beyond what a map can address (32768 voxels from its origin) nothing is known.
 /// @param T_world_body  world ENU, body FLU; of the attitude only the heading counts
 std::array<std::uint16_t, kBins> obstacle_distances(const mapping::MapView& view, const Pose& T_world_body,
                                                     const SectorOptions& options,

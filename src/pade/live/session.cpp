@@ -16,6 +16,7 @@
 #include "pade/core/option_check.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/link/obstacle_points.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
 namespace pade::live {
 namespace {
@@ -242,9 +243,12 @@ bool Session::map_next(std::vector<LiveFrame>& waiting, Time now) {
     return false;
   }
   if (answer.kind == PoseAnswer::Kind::valid) {
-    if (answer.jumps != jumps_) begin_anew();
+    if (answer.jumps != jumps_ && begin_anew()) origin_.setZero();
     jumps_ = answer.jumps;
-    map_frame(frame, answer.T_world_body);
+    const bool far = is_near_the_border(answer.T_world_body.translation);
+    if (far && any_frame_) counts_.borders += begin_anew() ? 1 : 0;
+    if (far && !any_frame_) origin_ = answer.T_world_body.translation;
+    map_frame(frame, {answer.T_world_body.rotation, answer.T_world_body.translation - origin_});
     const double took = seconds_between(now, now_of_ours());
     busy_ = busy_ > 0 ? 0.7 * busy_ + 0.3 * took : took;
   } else {
@@ -259,19 +263,30 @@ void Session::pass(const LiveFrame& frame) {
   for (Sink* const sink : parts_.sinks) sink->pass(frame);
 }
 
-/// Poses before and after do not belong together.
-void Session::begin_anew() {
+/// Whether what the camera and the sectors reach to may lie where no map that begins at the origin can hold
+/// it.
+bool Session::is_near_the_border(const Eigen::Vector3d& place) const {
+  constexpr double kReach = 200;  // m
+  const double half = mapper_options_.map.voxel * mapping::kTreeCentre;
+  return (place - origin_).cwiseAbs().maxCoeff() > half - std::min(kReach, half / 2);
+}
+
+/// What comes does not belong to what was there. False if that cannot be.
+bool Session::begin_anew() {
   auto made = ObstacleMapper::create(parts_.camera.camera(), mapper_options_, parts_.camera.mask());
-  if (!made) return;  // as at the start, where it was possible
+  if (!made) return false;  // as at the start, where it was possible
   mapper_ = std::move(*made);
   view_.reset();
+  any_frame_ = false;
   if (parts_.recorder != nullptr) parts_.recorder->begin_anew();
   counts_.mapped_anew = 0;
   ++counts_.restarts;
   for (Sink* const sink : parts_.sinks) sink->begin_anew();
+  return true;
 }
 
 void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
+  any_frame_ = true;
   const Matrix6d covariance = covariance_of(frame);
   const Pose T_world_camera = camera_pose(T_world_body, parts_.T_body_camera);
   if (parts_.recorder != nullptr)
@@ -291,6 +306,7 @@ void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
     pass(frame);
     return;
   }
+  counts_.outside += update.change.outside;
   view_ = view_ ? view_->after(mapper_.map(), update.change) : mapping::MapView::of(mapper_.map());
   const double share = share_with_depth(update.depth);
   if (share >= options_.least_depth) parts_.progress.depth = frame.time.nanoseconds;

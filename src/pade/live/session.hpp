@@ -47,12 +47,14 @@ Status check(const SessionOptions& options);
 
 /// What became of the frames: each counts once.
 struct SessionCounts {
-  std::size_t frames = 0;                      ///< that the camera delivered
-  std::size_t dropped = 0;                     ///< for newer ones
-  std::size_t skipped = 0;                     ///< without a pose, or unusable
-  std::size_t mapped = 0;                      ///< all others, with the first of a map
-  std::size_t mapped_anew = 0;                 ///< of these, since the poses last jumped
-  std::size_t restarts = 0;                    ///< maps begun anew because the poses jumped
+  std::size_t frames = 0;       ///< that the camera delivered
+  std::size_t dropped = 0;      ///< for newer ones
+  std::size_t skipped = 0;      ///< without a pose, or unusable
+  std::size_t mapped = 0;       ///< all others, with the first of a map
+  std::size_t mapped_anew = 0;  ///< of these, since the poses last jumped
+  std::size_t restarts = 0;     ///< maps begun anew
+  std::size_t borders = 0;  ///< of these, since the vehicle came near the border of what a map can address
+  std::size_t outside = 0;  ///< points beyond it, which no map has
   std::map<std::string, std::size_t> reasons;  ///< of those skipped
 };
 
@@ -110,6 +112,9 @@ class Session {
   void run(const std::function<bool()>& stop);
 
   [[nodiscard]] const mapping::OccupancyMap& map() const { return mapper_.map(); }
+  /// Where the map's 0 0 0 is in the world of the poses, m: there as well, unless the vehicle has come so far
+  /// (32768 voxels less 200 m) that a map from there would end around it.
+  [[nodiscard]] const Eigen::Vector3d& origin() const { return origin_; }
   /// While the session runs, for its own thread: as of when `stop` is asked.
   [[nodiscard]] const SessionCounts& counts() const { return counts_; }
   /// What the images say of their stamps against those of the poses.
@@ -129,13 +134,16 @@ class Session {
   void map_frame(const LiveFrame& frame, const Pose& T_world_body);
   void skip(const std::string& reason);
   void pass(const LiveFrame& frame);
-  void begin_anew();
+  [[nodiscard]] bool is_near_the_border(const Eigen::Vector3d& place) const;
+  bool begin_anew();
 
   SessionParts parts_;
   SessionOptions options_;
   ObstacleMapperOptions mapper_options_;
   ObstacleMapper mapper_;
   std::shared_ptr<const mapping::MapView> view_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  bool any_frame_ = false;  // is in this map
   std::size_t jumps_ = 0;
   double busy_ = 0;  // that a frame took lately, s
   Time last_;        // frame that was mapped

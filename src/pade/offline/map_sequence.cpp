@@ -32,19 +32,35 @@ constexpr std::size_t kReportFrames = 4;
 /// A frame as it comes from the disk, with its truth.
 struct Loaded {
   Result<Frame> frame = Error{};
-  cv::Mat truth;  // empty where there is none
+  cv::Mat truth;                         // empty where there is none
+  std::optional<io::Skipped> bad_truth;  // why, where a depth image is there
 };
 
 Loaded load(const io::Sequence& sequence, std::size_t i) {
-  Loaded loaded{sequence.frame(i), {}};
-  if (sequence.has_truth()) {
-    if (auto truth = sequence.truth(i)) loaded.truth = *truth;
+  Loaded loaded{sequence.frame(i), {}, {}};
+  const std::filesystem::path& file = sequence.depth_file(i);
+  if (file.empty()) return loaded;
+  if (auto truth = sequence.truth(i)) {
+    loaded.truth = *truth;
+  } else {
+    loaded.bad_truth = io::skipped_in(sequence.folder(), file.string(), truth.error().message);
   }
   return loaded;
 }
 
 double masked_share(const cv::Mat& mask) {
   return 1 - static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
+}
+
+/// What stands on what is judged along +z of the world of the poses.
+Status check_footing(const io::Sequence& sequence, const depth::FootingOptions& footing) {
+  constexpr double kAgrees = 0.999;
+  const auto& up = sequence.world_up();
+  if (!footing.on || (up && up->direction.z() > kAgrees)) return {};
+  return Error{
+      fmt::format("footing.on: needs poses in a world whose up is +z; found {}; leave it off, or state "
+                  "the true up with --world-up or world_up in camera.yaml",
+                  up ? io::to_text(up->direction) + " (" + up->source + ")" : "no common up")};
 }
 
 /// For images that have none yet.
@@ -97,6 +113,15 @@ class Run {
   }
 
   Status add(std::size_t i, Loaded loaded) {
+    depth_files_ += sequence_.depth_file(i).empty() ? 0 : 1;
+    if (loaded.bad_truth) {
+      bad_truths_.push_back(std::move(*loaded.bad_truth));
+      if (sequence_.options().strict) {
+        return Error{fmt::format("{}: {}, refused because of strict",
+                                 (sequence_.folder() / bad_truths_.back().file).string(),
+                                 bad_truths_.back().reason)};
+      }
+    }
     if (!loaded.frame) {
       undecodable_.push_back({sequence_.image_file(i).string(), loaded.frame.error().message});
       ++missed_;
@@ -183,7 +208,8 @@ class Run {
     info.version = version;
     info.sequence = io::absolute_path(sequence_.folder()).lexically_normal();
     info.poses = sequence_.pose_file().filename().string();
-    info.options = io::json_of(options_).dump();
+    info.options =  // names of files may hold bytes that are no UTF-8
+        io::json_of(options_).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
     info.camera = sequence_.camera();
     info.window = options_.mapper.depth.window;
     info.range_limit = options_.mapper.depth.range;
@@ -194,8 +220,15 @@ class Run {
     info.health.motions_without_scale = static_cast<int>(sequence_.motions_without_scale());
     info.health.skipped = sequence_.skipped();
     info.health.skipped.insert(info.health.skipped.end(), undecodable_.begin(), undecodable_.end());
+    info.health.skipped.insert(info.health.skipped.end(), bad_truths_.begin(), bad_truths_.end());
     info.health.navigation = sequence_.navigation();
     info.health.warnings = sequence_.notes();
+    if (!bad_truths_.empty()) {
+      info.health.warnings.push_back(
+          fmt::format("the true depth of {} of {} frames cannot be read and nothing is compared with it; "
+                      "first: {}: {}",
+                      bad_truths_.size(), depth_files_, bad_truths_[0].file, bad_truths_[0].reason));
+    }
     info.world_up = sequence_.world_up();
     info.origin = sequence_.origin();
     info.local_origin = sequence_.local_origin();
@@ -264,6 +297,8 @@ class Run {
   std::vector<evaluation::ReportFrame> frames_;
   std::map<Time, cv::Mat> truths_;  // of the frames whose depth may still come
   std::vector<io::Skipped> undecodable_;
+  std::vector<io::Skipped> bad_truths_;
+  std::size_t depth_files_ = 0;
   std::vector<Eigen::Vector3d> path_;
   std::vector<io::StampedPose> world_path_;         // where options_.world_coordinates
   Eigen::Vector3d look_ = Eigen::Vector3d::Zero();  // optical axis at the last pose
@@ -328,6 +363,7 @@ Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOp
                                const std::function<bool(const MapProgress&)>& progress,
                                std::chrono::steady_clock::time_point started) {
   if (const Status status = check(options); !status) return status.error();
+  if (const Status status = check_footing(sequence, options.mapper.footing); !status) return status.error();
   auto mapper = ObstacleMapper::create(sequence.camera(), options.mapper, sequence.mask());
   if (!mapper) return mapper.error();
 

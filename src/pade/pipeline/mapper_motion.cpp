@@ -101,7 +101,8 @@ void ObstacleMapper::refine_by_depth(const RelativeMotion& given, Pair& pair, co
   const Eigen::Vector3d direction = motion.t_reference_other / length;
   Eigen::Matrix3d covariance = motion.covariance.topLeftCorner<3, 3>();
   const double along = direction.dot(covariance * direction);
-  const double longer = recent_.stretch(baselines_.push(given, direction, seen), update_.step);
+  const std::vector<double> factors = baselines_.push(given, direction, seen);
+  const double longer = recent_.stretch(factors, update_.step, baselines_.variance());
   if (!found_.empty()) found_.rho *= 1 / longer;
   motion.t_reference_other = baselines_.length() * direction;
   covariance += (baselines_.variance() * motion.t_reference_other.squaredNorm() - along) * direction *

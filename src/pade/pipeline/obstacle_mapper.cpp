@@ -11,6 +11,7 @@
 #include "pade/core/option_check.hpp"
 #include "pade/depth/derotation.hpp"
 #include "pade/depth/image/outlines.hpp"
+#include "pade/depth/multi_view/exposure.hpp"
 #include "pade/depth/pair_fusion.hpp"
 #include "pade/depth/prediction.hpp"
 #include "pade/flow/methods/clg.hpp"
@@ -52,11 +53,12 @@ Status check(const Camera& camera, const ObstacleMapperOptions& options, const c
 
 /// The motion that the poses as given tell, with its covariance. Over several frames the error is that of a
 /// velocity: it grows with their number.
-/// @param older, newer  poses. @param covariance  of the last of the `step` motions, older frame as reference
+/// @param older, newer  poses. @param covariances  sum of those of the `step` motions, older frame as
+/// reference
 RelativeMotion motion_between(const Pose& older, const Pose& newer, double duration,
-                              const Matrix6d& covariance, int step, Order order) {
+                              const Matrix6d& covariances, int step, Order order) {
   RelativeMotion forward = relative_motion(older, newer, duration);
-  forward.covariance = step * step * covariance;
+  forward.covariance = step * covariances;
   return order == Order::newest ? reversed(forward) : forward;
 }
 
@@ -77,18 +79,28 @@ bool many_views(const ObstacleMapperOptions& o) {
   return o.views.count > 0 && two_baselines(o) && o.depth.window == 1 && o.depth.gates == depth::Gates::on;
 }
 
-/// The pose has moved, the image is the same.
-bool hangs(const TrackedFrame& newest, const TrackedFrame& last) {
-  constexpr double kMoved = 0.005;   // m
-  constexpr double kTurned = 0.001;  // rad
-  const Pose motion = last.given.inverse() * newest.given;
-  if (motion.translation.norm() < kMoved && rotation_log(motion.rotation).norm() < kTurned) return false;
-  const cv::Mat& a = newest.frame.image;
-  const cv::Mat& b = last.frame.image;
+bool is_same(const cv::Mat& a, const cv::Mat& b) {
   for (int v = 0; v < a.rows; ++v) {
     if (std::memcmp(a.ptr(v), b.ptr(v), static_cast<std::size_t>(a.cols)) != 0) return false;
   }
   return true;
+}
+
+/// The border of a mask stands still in the image, as a thing infinitely far would: no window that judges a
+/// match, with the gradients in it, may see it.
+cv::Mat clear_of_border(const cv::Mat& valid) {
+  constexpr int kReach = 4;  // px
+  cv::Mat clear;
+  if (!valid.empty()) cv::erode(valid, clear, cv::Mat::ones(2 * kReach + 1, 2 * kReach + 1, CV_8UC1));
+  return clear;
+}
+
+/// The pose has moved since the image was new, however slowly.
+bool hangs(const TrackedFrame& newest) {
+  constexpr double kMoved = 0.005;   // m
+  constexpr double kTurned = 0.001;  // rad
+  const Pose motion = newest.since.inverse() * newest.given;
+  return motion.translation.norm() >= kMoved || rotation_log(motion.rotation).norm() >= kTurned;
 }
 
 constexpr int kGuidedLevel = 1;  // flow over the longer baseline starts near its end
@@ -163,13 +175,16 @@ const MapperUpdate& ObstacleMapper::add(const cv::Mat& image, Time time, const P
     return update_;
   }
 
-  TrackedFrame newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera};
+  TrackedFrame newest{{time, {}, T_world_camera, motion_covariance}, T_world_camera, T_world_camera};
   newest.rate = rate;
   {
     const Stopwatch watch(update_, Stage::grey);
     newest.frame.image = to_grey(image);
   }
-  if (!recent_.empty() && hangs(newest, recent_.last())) {
+  if (!recent_.empty() && is_same(newest.frame.image, recent_.last().frame.image)) {
+    newest.since = recent_.last().since;
+  }
+  if (hangs(newest)) {
     update_.reason = "the camera has moved, but the image is that of before to the last bit: it hangs";
     update_.outcome = MapperUpdate::Outcome::skipped;
     update_.change = map_.forget(time);
@@ -211,9 +226,11 @@ void ObstacleMapper::map_frame(TrackedFrame& newest) {
 
   // Relative translation and rotation (Section 2.2), optical flow (Section 2.1), and what the images say of
   // the motion.
+  Matrix6d covariances = newest.frame.motion_covariance;
+  for (int i = 1; i < options_.step; ++i) covariances += recent_.before(i).frame.motion_covariance;
   const RelativeMotion prior =
       motion_between(older.given, newest.given, seconds_between(older.frame.time, newest.frame.time),
-                     newest.frame.motion_covariance, options_.step, options_.order);
+                     covariances, options_.step, options_.order);
   cv::Mat foretold;
   {
     const Stopwatch watch(update_, Stage::flow);
@@ -224,6 +241,7 @@ void ObstacleMapper::map_frame(TrackedFrame& newest) {
   refine(pair, newest, reference);
   if (many_views(options_)) refine_by_depth(prior, pair, newest.frame);
   place(newest, older);
+  newest.motion = pair.motion;
 
   // Average optical flow and calculate the depth image (Section 2.3).
   estimate_depth(pair, reference, prior.R_reference_other, update_.depth);
@@ -326,7 +344,7 @@ RelativeMotion ObstacleMapper::motion_to(const Frame& newest, const Pair& pair, 
   const Frame& other = recent_.before(frames).frame;
   RelativeMotion motion =
       relative_motion(newest.T_world_camera, other.T_world_camera, seconds_between(newest.time, other.time));
-  motion.covariance = over_several(pair.motion, (frames + options_.step - 1) / options_.step);
+  motion.covariance = recent_.covariance(newest, pair.motion, frames, options_.step);
   return motion;
 }
 
@@ -358,8 +376,11 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
   }
   const cv::Mat start = depth::start_of_views(update_.depth, pair.flow.vectors, camera_, pair.motion,
                                               newest.T_world_camera, found_, baseline, options_.views.depth);
-  const ParallaxField& field =
-      views_.estimate(newest.image, views, start * scale, update_.diagnostics.image_noise);
+  const cv::Mat d = start * scale;
+  for (flow::View& view : views) {
+    view.image = depth::at_exposure_of(newest.image, view.image, d, view.H, view.e, valid_);
+  }
+  const ParallaxField& field = views_.estimate(newest.image, views, d, update_.diagnostics.image_noise);
   const depth::CommonError common(camera_, motions, options_.views.flow.largest_parallax);
   depth::read_views(field, scale, common, options_.depth, options_.views.depth, update_.depth);
   found_ = {newest.T_world_camera, field.distance * (1 / scale)};
@@ -372,8 +393,9 @@ void ObstacleMapper::see_from_many(const Frame& newest, const Pair& pair) {
 void ObstacleMapper::estimate_depth(const Pair& pair, const Frame& reference,
                                     const std::optional<Eigen::Matrix3d>& removed, DepthImage& out) {
   const Stopwatch watch(update_, Stage::depth);
+  const cv::Mat valid = clear_of_border(valid_);
   depth::DepthInput input{camera_,         pair.motion, pair.flow, options_.derotation,
-                          reference.image, pair.seen,   valid_};
+                          reference.image, pair.seen,   valid};
   const bool refined = update_.refinement.outcome == depth::RefinementOutcome::refined;
   if (refined && removed) input.rotation_removed = *removed;
   if (!removed) input.texture = depth_.gate();  // of the first pair: the same image, and much the same lines

@@ -1,9 +1,22 @@
 #include "pade/pipeline/recent_frames.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace pade {
+namespace {
+
+void set_length_variance(RelativeMotion& motion, double of_logarithm) {
+  const Eigen::Vector3d& t = motion.t_reference_other;
+  const double squared = t.squaredNorm();
+  if (!(squared > 0)) return;
+  auto covariance = motion.covariance.topLeftCorner<3, 3>();
+  const double along = t.dot(covariance * t) / squared;
+  covariance += (of_logarithm - along / squared) * t * t.transpose();
+}
+
+}  // namespace
 
 void RecentFrames::push(TrackedFrame frame, int most) {
   frames_.push_back(std::move(frame));
@@ -35,7 +48,7 @@ std::vector<int> RecentFrames::views(const Frame& newest, int count, int frames,
   return views;
 }
 
-double RecentFrames::stretch(const std::vector<double>& factors, int steps) {
+double RecentFrames::stretch(const std::vector<double>& factors, int steps, double variance) {
   if (frames_.empty()) return 1;
   Eigen::Vector3d was = last().frame.T_world_camera.translation;
   Eigen::Vector3d is = was;
@@ -49,6 +62,10 @@ double RecentFrames::stretch(const std::vector<double>& factors, int steps) {
     was = p;
     is += factor * step;
     p = is;
+    if (auto& motion = frames_[frames_.size() - i].motion) {
+      motion->t_reference_other *= factor;
+      set_length_variance(*motion, variance);
+    }
     if (static_cast<int>(i) > steps) continue;
     before_it += step.norm();
     after_it += factor * step.norm();
@@ -56,13 +73,33 @@ double RecentFrames::stretch(const std::vector<double>& factors, int steps) {
   return before_it > 0 ? after_it / before_it : 1;
 }
 
-Matrix6d over_several(const RelativeMotion& one, int n) {
-  Matrix6d sum = n * one.covariance;
-  const double length = one.t_reference_other.norm();
-  if (!(length > 0)) return sum;
-  const Eigen::Vector3d along = one.t_reference_other / length;
-  const double variance = along.dot(one.covariance.topLeftCorner<3, 3>() * along);
-  sum.topLeftCorner<3, 3>() += (n * n - n) * variance * along * along.transpose();
+Matrix6d RecentFrames::covariance(const Frame& newest, const RelativeMotion& first, int frames,
+                                  int step) const {
+  Matrix6d sum = first.covariance;
+  Eigen::Vector3d lengthened = Eigen::Vector3d::Zero();  // by one sigma of all lengths
+  Eigen::Matrix3d of_lengths = Eigen::Matrix3d::Zero();  // as far as `sum` has them
+  const auto lengthen = [&](const RelativeMotion& motion, const Matrix6d& covariance,
+                            const Eigen::Matrix3d& R) {
+    const double length = motion.t_reference_other.norm();
+    if (!(length > 0)) return;
+    const Eigen::Vector3d along = R * motion.t_reference_other / length;
+    const double variance = along.dot(covariance.topLeftCorner<3, 3>() * along);
+    lengthened += std::sqrt(std::max(variance, 0.0)) * along;
+    of_lengths += variance * along * along.transpose();
+  };
+  lengthen(first, first.covariance, Eigen::Matrix3d::Identity());
+  for (int i = step; i < frames; i += step) {
+    const TrackedFrame& frame = before(i);
+    const RelativeMotion& motion = frame.motion ? *frame.motion : first;
+    const Eigen::Matrix3d R =
+        (newest.T_world_camera.rotation.conjugate() * frame.frame.T_world_camera.rotation).toRotationMatrix();
+    Matrix6d turned = Matrix6d::Zero();
+    turned.topLeftCorner<3, 3>() = turned.bottomRightCorner<3, 3>() = R;
+    const Matrix6d covariance = turned * motion.covariance * turned.transpose();
+    sum += covariance;
+    lengthen(motion, covariance, R);
+  }
+  if (frames > step) sum.topLeftCorner<3, 3>() += lengthened * lengthened.transpose() - of_lengths;
   return sum;
 }
 

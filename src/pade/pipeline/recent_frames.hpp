@@ -15,8 +15,11 @@ namespace pade {
 struct TrackedFrame {
   Frame frame;                                         ///< grey; T_world_camera is the refined one
   Pose given;                                          ///< T_world_camera as it came
+  Pose since;                                          ///< `given` of the first frame with this very image
   bool corrected = false;                              ///< the two differ
   std::optional<Eigen::Vector3d> rate = std::nullopt;  ///< of turn, camera axes, rad/s; empty: not given
+  /// Its own motion, refined: of its partner, seen from it. Empty: it had none.
+  std::optional<RelativeMotion> motion = std::nullopt;
 };
 
 /// The last frames, newest last.
@@ -40,15 +43,21 @@ class RecentFrames {
 
   /// Stretches the steps between the frames about the last one.
   /// @param factors  of the steps, oldest first. @param steps  the last so many are a baseline
+  /// @param variance  of the logarithm of their lengths from now on, common to all
   /// @return by how much this baseline is longer now.
-  double stretch(const std::vector<double>& factors, int steps);
+  double stretch(const std::vector<double>& factors, int steps, double variance);
+
+  /// Covariance of the motion from before(frames) to the newest frame, over the steps between: what the
+  /// images have measured is new in each, the error of their lengths is not. Each step counts with its own
+  /// length and its own covariance.
+  /// @param newest  not yet taken in. @param first  its motion, of before(step) seen from it. @param frames
+  /// at most size(). @param step  frames of a pair
+  /// @return in the axes of the newest one
+  [[nodiscard]] Matrix6d covariance(const Frame& newest, const RelativeMotion& first, int frames,
+                                    int step) const;
 
  private:
   std::deque<TrackedFrame> frames_;
 };
-
-/// Covariance of a motion over `n` steps like this one: what the images have measured is new in each, the
-/// length of the baseline is not.
-Matrix6d over_several(const RelativeMotion& one, int n);
 
 }  // namespace pade

@@ -37,7 +37,28 @@ std::string innovation_plot(const NavigationRun& run, navigation::SensorKind kin
   return simple_plot(title, "time, s", "innovation, " + unit, series, false);
 }
 
-std::string path_plots(const NavigationLog& log, const NavigationRun& run) {
+/// The truth of the body at the stamps of the images.
+std::vector<TrueState> truth_at_stamps(const NavigationLog& log, const NavigationRunOptions& options) {
+  const auto offset = Time::from_seconds(options.navigator.camera_time_offset).nanoseconds;
+  std::vector<TrueState> truth = log.truth;
+  for (TrueState& state : truth) state.time.nanoseconds -= offset;
+  return truth;
+}
+
+/// The truth of what a run's motions are of: the camera, at the stamps of its images. (A motion of the body
+/// made of the camera's would need its covariance moved too.)
+std::vector<TrueState> camera_truth(const NavigationLog& log, const NavigationRunOptions& options) {
+  std::vector<TrueState> truth = truth_at_stamps(log, options);
+  for (TrueState& state : truth) state.T_world_body = camera_pose(state.T_world_body, options.T_body_camera);
+  return truth;
+}
+
+std::optional<evaluation::MotionError> error_of(const FrameMotion& m, const std::vector<TrueState>& truth) {
+  return evaluation::score({m.t1, m.t2, m.pose.motion, m.pose.scale_valid, m.pose.direction_valid}, truth);
+}
+
+std::string path_plots(const NavigationLog& log, const std::vector<TrueState>& true_states,
+                       const NavigationRun& run) {
   Series path{"filter", kColours[0], {}, {}, false};
   Series fixes{"GNSS", "#999999", {}, {}, true};
   Series truth{"truth", kColours[1], {}, {}, false};
@@ -46,7 +67,7 @@ std::string path_plots(const NavigationLog& log, const NavigationRun& run) {
   for (const NavigationFrame& f : run.frames) {
     path.add(f.pose.T_world_body.translation.x(), f.pose.T_world_body.translation.y());
     speed.add(f.time.seconds(), f.pose.velocity.norm());
-    if (const auto t = evaluation::truth_at(log.truth, f.time)) {
+    if (const auto t = evaluation::truth_at(true_states, f.time)) {
       truth.add(t->T_world_body.translation.x(), t->T_world_body.translation.y());
       true_speed.add(f.time.seconds(), t->velocity.norm());
     }
@@ -62,15 +83,13 @@ std::string path_plots(const NavigationLog& log, const NavigationRun& run) {
          simple_plot("Speed", "time, s", "m/s", speeds, false);
 }
 
-std::string baseline_plot(const NavigationLog& log, const NavigationRun& run) {
+std::string baseline_plot(const std::vector<TrueState>& truth, const NavigationRun& run) {
   Series sigma{"predicted sigma", kColours[0], {}, {}, false};
   Series error{"error against truth", kColours[1], {}, {}, true};
   for (const FrameMotion& m : run.motions) {
     const double s = 100 * std::sqrt(m.pose.motion.covariance.topLeftCorner<3, 3>().trace());
     sigma.add(m.t2.seconds(), s);
-    const auto e =
-        evaluation::score({m.t1, m.t2, m.pose.motion, m.pose.scale_valid, m.pose.direction_valid}, log.truth);
-    if (e) error.add(m.t2.seconds(), 100 * e->translation);
+    if (const auto e = error_of(m, truth)) error.add(m.t2.seconds(), 100 * e->translation);
   }
   std::vector<Series> series;
   if (!error.x.empty()) series.push_back(error);
@@ -145,29 +164,17 @@ std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
                                                        const NavigationRunOptions& options,
                                                        const NavigationRun& run) {
   if (log.truth.empty()) return std::nullopt;
+  const std::vector<TrueState> truth = camera_truth(log, options);
   std::vector<evaluation::MotionError> errors;
   for (const FrameMotion& m : run.motions) {
-    // The truth is of the body: score the motion that the body made.
-    RelativeMotion body = m.pose.motion;
-    const Pose camera{Eigen::Quaterniond(body.R_reference_other), body.t_reference_other};
-    const Pose moved = options.T_body_camera * camera * options.T_body_camera.inverse();
-    const bool same = options.T_body_camera.translation.isZero(0) &&
-                      options.T_body_camera.rotation.isApprox(Eigen::Quaterniond::Identity());
-    if (!same) {
-      body.R_reference_other = moved.matrix3();
-      body.t_reference_other = moved.translation;
-    }
-    const auto offset = Time::from_seconds(options.navigator.camera_time_offset).nanoseconds;
-    const auto error = evaluation::score({Time{m.t1.nanoseconds + offset}, Time{m.t2.nanoseconds + offset},
-                                          body, m.pose.scale_valid, m.pose.direction_valid},
-                                         log.truth);
-    if (error) errors.push_back(*error);
+    if (const auto error = error_of(m, truth)) errors.push_back(*error);
   }
   if (errors.empty()) return std::nullopt;
   return evaluation::summarise(errors);
 }
 
-std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run,
+std::string navigation_report(const std::string& title, const NavigationLog& log,
+                              const NavigationRunOptions& options, const NavigationRun& run,
                               const std::optional<evaluation::MotionSummary>& score,
                               const std::string& figures) {
   std::string html = evaluation::begin_page(title, evaluation::plot_page_style, log.remarks);
@@ -181,7 +188,8 @@ std::string navigation_report(const std::string& title, const NavigationLog& log
         100 * score->translation_median, 100 * score->translation_95, score->rotation_95 * 180 / M_PI,
         score->nees_mean, score->pairs);
   }
-  html += health_table(run) + path_plots(log, run) + baseline_plot(log, run);
+  html += health_table(run) + path_plots(log, truth_at_stamps(log, options), run) +
+          baseline_plot(camera_truth(log, options), run);
   html += innovation_plot(run, navigation::SensorKind::gnss_velocity, "GNSS velocity", "m/s");
   html += innovation_plot(run, navigation::SensorKind::gnss_position, "GNSS position", "m");
   html +=

@@ -16,14 +16,17 @@ std::string format_trajectory(const NavigationRun& run);
 /// the 6x6 covariance of translation and rotation vector, flags.
 std::string format_relative_motion(const NavigationRun& run);
 
-/// The motions of the body against `log.truth`; empty if no motion has a truth.
-/// @param options  of the run
+/// The motions of the camera (of the body where no camera is stated) against what `log.truth` says of it;
+/// empty if no motion has a truth.
+/// @param options  of the run: where the camera sits on the body of the truth, and how late its stamps are
 std::optional<evaluation::MotionSummary> score_motions(const NavigationLog& log,
                                                        const NavigationRunOptions& options,
                                                        const NavigationRun& run);
 
-/// `title`: what was played. `score`: that of score_motions(). `figures`: more of them, as HTML.
-std::string navigation_report(const std::string& title, const NavigationLog& log, const NavigationRun& run,
+/// `title`: what was played. `options`: of the run. `score`: that of score_motions(). `figures`: more of
+/// them, as HTML.
+std::string navigation_report(const std::string& title, const NavigationLog& log,
+                              const NavigationRunOptions& options, const NavigationRun& run,
                               const std::optional<evaluation::MotionSummary>& score,
                               const std::string& figures = {});
 

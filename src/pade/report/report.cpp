@@ -198,8 +198,12 @@ std::string accuracy_row(const RangeAccuracy& range, bool with_sigma, bool is_al
 
 std::string accuracy_section(const Report& report) {
   std::string html = "<h2>Accuracy</h2>\n";
-  if (!report.accuracy)
-    return html + "<p class=\"soft\">The sequence has no true depth to compare with.</p>\n";
+  if (!report.accuracy) {
+    return html + fmt::format("<p class=\"soft\">The sequence has no true depth to compare with{}.</p>\n",
+                              report.info.health.skipped.empty()
+                                  ? ""
+                                  : ", or none that can be used: what was skipped is listed with its reason");
+  }
   const DepthAccuracy& accuracy = *report.accuracy;
   const bool with_sigma = accuracy.all.sigma_pixels > 0;
   html +=

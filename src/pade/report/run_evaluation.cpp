@@ -20,7 +20,8 @@ Result<std::optional<DepthAccuracy>> stored_accuracy(const io::Run& run) {
   return std::optional(std::move(accuracy).value());
 }
 
-Result<DepthAccuracy> evaluate_stack(const io::Run& run, const io::Sequence& sequence) {
+Result<DepthAccuracy> evaluate_stack(const io::Run& run, const io::Sequence& sequence,
+                                     std::vector<io::Skipped>* skipped) {
   const auto refuse = [&run](const std::string& why) {
     return Error{fmt::format("{}: {}", run.folder.string(), why)};
   };
@@ -36,6 +37,7 @@ Result<DepthAccuracy> evaluate_stack(const io::Run& run, const io::Sequence& seq
   for (std::size_t i = 0; i < sequence.size(); ++i) frame_at.emplace(sequence.time(i), i);
 
   Accumulator accumulator(run.info.range_limit);
+  std::string first_reason;
   for (const Time time : run.depth_times) {
     if (io::interrupted()) return io::interrupted_error();
     const auto frame = frame_at.find(time);
@@ -43,14 +45,22 @@ Result<DepthAccuracy> evaluate_stack(const io::Run& run, const io::Sequence& seq
       return refuse(fmt::format("found depth at {} s, when {} has no frame", to_string(time),
                                 sequence.folder().string()));
     }
+    const std::filesystem::path& file = sequence.depth_file(frame->second);
+    if (file.empty()) continue;  // not every frame needs to have truth
     const Result<cv::Mat> truth = sequence.truth(frame->second);
-    if (!truth) continue;  // not every frame needs to have truth
+    if (!truth) {
+      io::Skipped bad = io::skipped_in(sequence.folder(), file.string(), truth.error().message);
+      if (first_reason.empty()) first_reason = fmt::format("; first: {}: {}", bad.file, bad.reason);
+      if (skipped != nullptr) skipped->push_back(std::move(bad));
+      continue;
+    }
     const Result<DepthImage> depth = io::read_depth_image(run, time);
     if (!depth) return depth.error();
     accumulator.add(*depth, *truth);
   }
   if (accumulator.empty())
-    return refuse(fmt::format("found no frame with true depth in {}", sequence.folder().string()));
+    return refuse(fmt::format("found no frame with true depth that can be used in {}{}",
+                              sequence.folder().string(), first_reason));
   return accumulator.result();
 }
 

@@ -135,6 +135,36 @@ TEST(ConvertedFlight, TakesTheOffsetOutOfPosesAndSensorsAlike) {
   }
 }
 
+TEST(ConvertedFlight, KeepsWhatIsStamped0) {
+  const TemporaryFolder folder;
+  test::Flight flight = test::make_flight(20);
+  const std::int64_t first = flight.times[0].nanoseconds;
+  for (Time& time : flight.times) time.nanoseconds -= first;
+  const NavigationLog log = test::some_sensors(Time{0});
+  const Sequence original = test::opened_flight(folder / "flight", flight);
+  ASSERT_EQ(original.size(), flight.size());
+  for (const char* const name : {"copy.bag", "copy.mcap", "copy"}) {
+    convert(original, &log, folder / name);
+    const auto copy = Sequence::open(folder / name);
+    ASSERT_TRUE(copy) << copy.error().message;
+    ASSERT_EQ(copy->size(), original.size()) << name;
+    for (std::size_t i = 0; i < original.size(); ++i) EXPECT_EQ(copy->time(i), original.time(i)) << name;
+    const auto sensors = read_navigation_log(folder / name);
+    ASSERT_TRUE(sensors) << sensors.error().message;
+    const auto expect_times = [&](const auto& read, const auto& written, const char* what) {
+      ASSERT_EQ(read.size(), written.size()) << name << " " << what;
+      for (std::size_t i = 0; i < written.size(); ++i)
+        EXPECT_EQ(read[i].time, written[i].time) << name << " " << what << " " << i;
+    };
+    EXPECT_EQ(log.imu.front().time, Time{0});
+    expect_times(sensors->imu, log.imu, "IMU");
+    expect_times(sensors->gnss.fixes, log.gnss.fixes, "positions");
+    expect_times(sensors->gnss.velocities, log.gnss.velocities, "velocities");
+    expect_times(sensors->magnetometer, log.magnetometer, "magnetometer");
+    expect_times(sensors->barometer, log.barometer, "barometer");
+  }
+}
+
 TEST(ConvertedFlight, OfALiveSessionKeepsMaskAndMotions) {
   const TemporaryFolder folder;
   test::Flight flight = test::make_flight();

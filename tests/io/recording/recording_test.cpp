@@ -205,6 +205,25 @@ TEST(RecordedFlight, APoseOfTheBodyNeedsTheMountingOfTheCamera) {
   EXPECT_TRUE(read->poses_of_body());
 }
 
+TEST(Bag, HasNoRecordAtTimeZeroWhichRosbagDoesNotPlay) {
+  const test::TemporaryFolder folder;
+  const fs::path file = folder.path() / "zero.bag";
+  auto writer = create_recording(file, Overwrite::refuse);
+  ASSERT_TRUE(writer) << writer.error().message;
+  for (const Time time : {Time{0}, Time{5}}) {
+    const MessageHeader header{time, "map"};
+    ASSERT_TRUE((*writer)->write("/pressure", "sensor_msgs/FluidPressure", time,
+                                 write_pressure(header, 1e5, MessageEncoding::ros1)));
+  }
+  ASSERT_TRUE((*writer)->finish());
+  const auto recording = Recording::open(file);
+  ASSERT_TRUE(recording) << recording.error().message;
+  const auto& messages = recording->topics().at(0).messages;
+  ASSERT_EQ(messages.size(), 2U);
+  EXPECT_EQ(messages[0].time, Time{1});
+  EXPECT_EQ(messages[1].time, Time{5});
+}
+
 TEST(RecordedImages, EveryEncodingIsUnderstood) {
   const std::string bytes = {10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 110, 120};
   const auto pixel = [&](const char* encoding, std::uint32_t width, std::uint32_t step) -> Result<cv::Mat> {

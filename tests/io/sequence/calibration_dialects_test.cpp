@@ -58,6 +58,14 @@ TEST_P(Dialects, GiveTheCamera) {
   EXPECT_EQ(*read->camera, GetParam().camera);
 }
 
+TEST_P(Dialects, RefuseANumberThatTheyHaveNoCameraOf) {
+  for (const int number : {4, 99}) {
+    const auto read = parse_calibration(GetParam().text, "file.yaml", number);
+    ASSERT_FALSE(read) << number;
+    EXPECT_THAT(read.error().message, testing::HasSubstr("file.yaml")) << number;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Of, Dialects,
     testing::Values(

@@ -1,5 +1,6 @@
 // The same flight in the folders of TartanAir and ICL-NUIM, as the data sets are unpacked.
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 #include <fmt/format.h>
@@ -14,6 +15,8 @@
 
 namespace pade::io {
 namespace {
+
+namespace fs = std::filesystem;
 
 using test::Flight;
 using test::TemporaryFolder;
@@ -242,6 +245,53 @@ TEST(DepthFile, RefusesArraysThatAreNoDepth) {
     EXPECT_NE(message("cut.npy"), "") << size;
   }
   EXPECT_THAT(message("none.npy"), HasSubstr("none.npy"));
+}
+
+TEST(CameraNumber, IsThatOfTheCalibrationThatHasTheLastWord) {
+  const TemporaryFolder folder;
+  const Flight flight = test::make_flight();
+  test::write_tum(folder.path(), flight);
+  const auto chain = [&](int cameras) {
+    std::string text;
+    for (int i = 0; i < cameras; ++i) {
+      text += fmt::format(
+          "cam{}:\n  camera_model: pinhole\n  intrinsics: [{}, {}, 31, 23]\n  distortion_model: none\n"
+          "  distortion_coeffs: []\n  resolution: [64, 48]\n",
+          i, 60 + i, 60 + i);
+    }
+    return text;
+  };
+  const auto opened = [&](int camera, const std::string& calibration = {}) {
+    SequenceOptions options;
+    options.camera = camera;
+    options.calibration = calibration;
+    const auto sequence = Sequence::open(folder.path(), options);
+    return sequence ? fmt::format("{}", sequence->camera().fx) : sequence.error().message;
+  };
+  const fs::path own = folder.path() / "camera.yaml";
+  const std::string other = (folder.path() / "camchain.yaml").string();
+  test::write_text(other, chain(5));
+  // Our own camera.yaml has one camera.
+  EXPECT_EQ(opened(0), "60");
+  EXPECT_THAT(opened(1), testing::AllOf(HasSubstr(own.string()), HasSubstr("number 1")));
+  EXPECT_EQ(opened(4, other), "64") << "camera.yaml is read too, and has no such number";
+  // So may a chain be the flight's own.
+  test::write_text(own, chain(3));
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(opened(i), fmt::format("{}", 60 + i));
+  EXPECT_THAT(opened(7), testing::AllOf(HasSubstr(own.string()), HasSubstr("cam7")));
+  EXPECT_EQ(opened(4, other), "64");
+}
+
+TEST(CameraNumber, IsRefusedWhereALayoutKnowsItsOnlyCamera) {
+  const TemporaryFolder folder;
+  const Flight flight = test::make_flight();
+  test::write_euroc(folder.path(), flight, {});
+  SequenceOptions options;
+  ASSERT_TRUE(Sequence::open(folder.path(), options));
+  options.camera = 1;
+  const auto sequence = Sequence::open(folder.path(), options);
+  ASSERT_FALSE(sequence);
+  EXPECT_THAT(sequence.error().message, HasSubstr("camera 1"));
 }
 
 }  // namespace

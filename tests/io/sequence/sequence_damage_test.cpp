@@ -11,6 +11,7 @@
 namespace pade::io {
 namespace {
 
+namespace fs = std::filesystem;
 using test::Flight;
 using testing::AllOf;
 using testing::ElementsAre;
@@ -369,6 +370,53 @@ TEST_F(DamagedSequence, OptionsWithoutMeaningAreRefused) {
     SequenceOptions options;
     change(options);
     EXPECT_FALSE(Sequence::open(folder_.path(), options));
+  }
+}
+
+/// Six frames with true depth of their own, `off` seconds late, in files that end in `ending`.
+void write_with_depth(const fs::path& folder, double off, const std::string& ending) {
+  const Flight flight = test::make_flight();
+  test::write_tum(folder, flight);
+  for (const Time time : flight.times) {
+    const Time late{time.nanoseconds + Time::from_seconds(off).nanoseconds};
+    const fs::path file = folder / "depth" / (to_string(late) + ".png");
+    test::write_image(file, cv::Mat(48, 64, CV_16UC1, cv::Scalar(2000)));
+    if (ending != ".png") fs::rename(file, fs::path(file).replace_extension(ending));
+  }
+}
+
+TEST(DamagedTruth, ThatNoFrameGetsIsSkippedWithItsReason) {
+  struct Case {
+    double off;
+    const char* ending;
+    const char* reason;  // nullptr: used
+  };
+  for (const Case& one :
+       {Case{0, ".png", nullptr},
+        {0.015, ".png", nullptr},
+        {0.03, ".png", "found 6 depth images, none within 0.02 s of a frame (the nearest is 0.03 s"},
+        {1e5, ".png", "none within 0.02 s of a frame"},
+        {0, ".npy", "found 6 files in it and no depth image"},
+        {0, ".exr", "found 6 files in it and no depth image"}}) {
+    const test::TemporaryFolder folder;
+    write_with_depth(folder.path(), one.off, one.ending);
+    SequenceOptions options;
+    const auto sequence = Sequence::open(folder.path(), options);
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    EXPECT_EQ(sequence->size(), 6U);
+    EXPECT_EQ(sequence->has_truth(), one.reason == nullptr) << one.off << one.ending;
+    options.strict = true;
+    const auto strict = Sequence::open(folder.path(), options);
+    EXPECT_EQ(strict.ok(), one.reason == nullptr);
+    if (one.reason == nullptr) {
+      EXPECT_THAT(sequence->skipped(), IsEmpty());
+      EXPECT_FALSE(sequence->depth_file(3).empty());
+      continue;
+    }
+    ASSERT_EQ(sequence->skipped().size(), 1U) << one.off << one.ending;
+    EXPECT_EQ(sequence->skipped()[0].file, "depth");
+    EXPECT_THAT(sequence->skipped()[0].reason, HasSubstr(one.reason));
+    EXPECT_THAT(strict.error().message, HasSubstr(one.reason));
   }
 }
 

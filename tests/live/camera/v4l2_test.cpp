@@ -34,6 +34,8 @@ constexpr std::size_t kLength = 64UL * 48 * 2;
 struct FakeDevice {
   int number = -1;
   std::uint32_t format = V4L2_PIX_FMT_GREY;  ///< the only one that it has
+  std::uint32_t small_format = 0;            ///< another one, of half the size
+  int opened = 0;                            ///< so often
   std::uint32_t width = kWidth;
   bool present = true, stalled = false, faulty = false, short_of_bytes = false, without_stamps = false;
   bool without_bytes = false, with_garbage = false;  ///< MJPEG of a camera on a busy bus
@@ -88,8 +90,9 @@ struct FakeDevice {
         return 0;
       case VIDIOC_S_FMT: {
         auto& pix = static_cast<v4l2_format*>(argument)->fmt.pix;
-        pix.pixelformat = format;
-        pix.width = width;
+        const bool small = small_format != 0 && pix.pixelformat == small_format;
+        pix.pixelformat = small ? small_format : format;
+        pix.width = small ? width / 2 : width;
         pix.bytesperline = 0;
         return 0;
       }
@@ -135,6 +138,7 @@ int open(const char* path, int flags, ...) {
   if (std::strcmp(path, kName) == 0) {
     if (!device().present) return errno = ENOENT, -1;
     device().broken = device().hung = false;
+    ++device().opened;
     device().number = ::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK);
     const itimerspec each{{0, 10'000'000}, {0, 10'000'000}};
     ::timerfd_settime(device().number, 0, &each, nullptr);
@@ -282,13 +286,44 @@ TEST_F(V4l2, IsOpenedAgainWhereItErrsOrHangs) {
   }
 }
 
+/// Whether the driver says so or the stamp itself. Opening it again and again would not help.
 TEST_F(V4l2, StampsOfAnotherClockAreRefusedByName) {
-  const auto source = opened();
-  ASSERT_TRUE(source);
-  device().of_other_clock = true;
-  LiveFrame frame;
-  EXPECT_FALSE(frame_within(**source, frame, 10));
-  EXPECT_THAT((*source)->remark(), HasSubstr("not of the monotonic clock"));
+  for (bool FakeDevice::*const fault : {&FakeDevice::of_other_clock, &FakeDevice::without_stamps}) {
+    device() = FakeDevice();
+    const auto source = opened();
+    ASSERT_TRUE(source);
+    device().*fault = true;
+    LiveFrame frame;
+    EXPECT_FALSE(frame_within(**source, frame, 10));
+    EXPECT_THAT((*source)->remark(), HasSubstr("not of the monotonic clock"));
+    Time start = now_of_ours();
+    while (seconds_between(start, now_of_ours()) < 1.2) EXPECT_FALSE(frame_within(**source, frame, 1));
+    EXPECT_EQ(device().opened, 1);
+    // Where it hangs at last, it is opened again.
+    device().hung = true;
+    start = now_of_ours();
+    while (device().opened == 1 && seconds_between(start, now_of_ours()) < 10)
+      EXPECT_FALSE(frame_within(**source, frame, 1));
+    EXPECT_EQ(device().opened, 2);
+    device().*fault = false;
+    EXPECT_TRUE(frame_within(**source, frame, 50));
+    EXPECT_EQ((*source)->remark(), "");
+  }
+}
+
+/// Many cameras on USB have their largest sizes in MJPEG alone.
+TEST_F(V4l2, ASizeThatOnlyAnotherFormatHasIsFound) {
+  for (const std::uint32_t small : {V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_YUYV}) {
+    device() = FakeDevice();
+    device().format = V4L2_PIX_FMT_MJPEG;
+    device().small_format = small;
+    const auto source = opened();
+    ASSERT_TRUE(source) << source.error().message;
+    LiveFrame frame;
+    EXPECT_TRUE(frame_within(**source, frame, 50));
+  }
+  device().width = 32;
+  EXPECT_THAT(opened().error().message, HasSubstr("gives 32 x 48, expected the calibration's 64 x 48"));
 }
 
 TEST_F(V4l2, IsOpenedAgainAfterItWasPulledOut) {

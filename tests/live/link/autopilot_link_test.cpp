@@ -2,156 +2,21 @@
 #include "pade/live/link/autopilot_link.hpp"
 
 #include <cmath>
-#include <deque>
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pade/live/mavlink/estimate_messages.hpp"
+#include "live/link/link_bench.hpp"
 
 namespace pade::live {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-constexpr std::int64_t kMillisecond = 1'000'000;
-constexpr std::uint8_t kActiveState = 4;
-
-/// What went over the line.
-struct Line {
-  std::vector<std::uint8_t> to_us;
-  std::vector<std::uint8_t> from_us;
-};
-
-class LoopPort : public Port {
- public:
-  explicit LoopPort(Line& line) : line_(line) {}
-  void wait(int /*milliseconds*/) override {}
-  std::size_t read(std::span<std::uint8_t> bytes) override {
-    const std::size_t count = std::min(bytes.size(), line_.to_us.size());
-    const auto end = line_.to_us.begin() + static_cast<std::ptrdiff_t>(count);
-    std::copy(line_.to_us.begin(), end, bytes.begin());
-    line_.to_us.erase(line_.to_us.begin(), end);
-    return count;
-  }
-  bool write(std::span<const std::uint8_t> bytes) override {
-    line_.from_us.insert(line_.from_us.end(), bytes.begin(), bytes.end());
-    return true;
-  }
-
- private:
-  Line& line_;
-};
-
-FrameObstacles with(const std::optional<mavlink::ObstacleDistance>& level,
-                    std::optional<std::vector<Eigen::Vector3d>> points = {}) {
-  return {level, std::move(points), {}, 0};
-}
-
-/// An autopilot that flies north at 2 m/s, heading north, and whose clock is 1000 s behind ours.
-class Bench {
- public:
-  explicit Bench(const LinkOptions& options = {}) : link_(std::make_unique<LoopPort>(line_), options) {}
-
-  /// Goes on in steps of 10 ms of our clock.
-  void run(double seconds) {
-    for (int i = 0; i < std::lround(100 * seconds); ++i) {
-      now_.nanoseconds += 10 * kMillisecond;
-      if (camera) progress_.image = now_.nanoseconds - 60 * kMillisecond;
-      if (mapper) progress_.mapper = now_.nanoseconds;
-      if (depth) progress_.depth = now_.nanoseconds - 120 * kMillisecond;
-      const std::int64_t ms = now_.nanoseconds / kMillisecond;
-      const auto boot = static_cast<std::uint32_t>(ms - 1'000'000);
-      if (heartbeat && ms % 1000 == 0) tell(mavlink::Heartbeat{2, kind, 0, 0, 4, 3});
-      if (poses && ms % 20 == 0) {
-        const double half = 0.5e-3 * turn_rate * static_cast<double>(ms % 1'000'000);
-        tell(mavlink::AttitudeQuaternion{boot,
-                                         static_cast<float>(std::cos(half)),
-                                         0,
-                                         0,
-                                         static_cast<float>(std::sin(half)),
-                                         0,
-                                         0,
-                                         static_cast<float>(turn_rate),
-                                         {}});
-      }
-      if (poses && positions && ms % 30 == 0) {
-        tell(mavlink::LocalPositionNed{boot, 0.002F * static_cast<float>(boot), 0, -5, 2, 0, 0});
-      }
-      if (questions && ms % 100 == 50) tell(mavlink::Timesync{0, 77'000 + ms});
-      link_.step(now_, progress_);
-      hear();
-    }
-  }
-  AutopilotLink& link() { return link_; }
-  void change_system(std::uint8_t system) { sender_.system = system; }
-  [[nodiscard]] Time now() const { return now_; }
-  void hear() {
-    parser_.add(line_.from_us, [&](const mavlink::Frame& frame) {
-      ++packets;
-      systems.push_back(frame.system);
-      if (const auto m = mavlink::unpack<mavlink::Heartbeat>(frame))
-        heartbeats.push_back({now_, m->system_status});
-      if (const auto m = mavlink::unpack<mavlink::StatusText>(frame))
-        texts.emplace_back(now_, m->text.data());
-      if (const auto m = mavlink::unpack<mavlink::ObstacleDistance>(frame)) {
-        sectors.push_back(now_);
-        last_sectors = *m;
-      }
-      if (const auto m = mavlink::unpack<mavlink::ObstacleDistance3d>(frame)) points.push_back(*m);
-      if (const auto m = mavlink::unpack<mavlink::CommandLong>(frame)) {
-        commands.push_back(*m);
-        tell(mavlink::CommandAck{m->command, ack});
-      }
-      const auto sync = mavlink::unpack<mavlink::Timesync>(frame);
-      if (sync && sync->tc1 == 0 && answers) {
-        tell(mavlink::Timesync{now_.nanoseconds - 1'000'000 * kMillisecond, sync->ts1});
-      }
-      if (sync && sync->tc1 != 0) answered.push_back(sync->ts1);
-    });
-    line_.from_us.clear();
-  }
-
-  bool heartbeat = true, poses = true, questions = false, answers = true;
-  bool camera = true, mapper = true, depth = true, positions = true;
-  std::uint8_t kind = px4_kind;
-  std::uint8_t ack = 0;
-  double turn_rate = 0;  ///< clockwise, rad/s
-  mavlink::ObstacleDistance last_sectors;
-  std::vector<mavlink::ObstacleDistance3d> points;
-
-  /// What we sent, by time.
-  struct Said {
-    Time time;
-    std::uint8_t state = 0;
-  };
-  std::vector<Said> heartbeats;
-  std::vector<std::pair<Time, std::string>> texts;
-  std::vector<Time> sectors;
-  std::vector<mavlink::CommandLong> commands;
-  std::vector<std::int64_t> answered;  ///< ts1 of their questions
-  std::vector<std::uint8_t> systems;
-  std::size_t packets = 0;
-
- private:
-  template <class Message>
-  void tell(const Message& message) {
-    const mavlink::Packet packet = pack(message, sender_);
-    line_.to_us.insert(line_.to_us.end(), packet.bytes.begin(),
-                       packet.bytes.begin() + static_cast<std::ptrdiff_t>(packet.length));
-  }
-
-  Line line_;
-  AutopilotLink link_;
-  mavlink::Sender sender_{7, 1, 0};
-  mavlink::Parser parser_;
-  Progress progress_;
-  Time now_{1'500'000 * kMillisecond};
-};
 
 TEST(AutopilotLink, SaysNothingBeforeItHasHeardTheAutopilot) {
   Bench bench;
@@ -328,6 +193,36 @@ TEST(AutopilotLink, NamesTheMessageThatThePosesLack) {
   EXPECT_GE(bench.commands.size(), 4U) << "plenty of attitudes are no reason to stop asking for positions";
 }
 
+/// When GNSS is lost the positions stop and the attitudes go on: that is no cable.
+TEST(AutopilotLink, NamesTheMessageThatHasStopped) {
+  for (bool Bench::*const input : {&Bench::positions, &Bench::attitudes}) {
+    Bench bench;
+    bench.run(5);
+    ASSERT_EQ(bench.link().report().missing, Missing::nothing);
+    bench.*input = false;
+    bench.texts.clear();
+    bench.run(3);
+    ASSERT_EQ(bench.texts.size(), 1U);
+    EXPECT_THAT(
+        bench.texts.back().second,
+        HasSubstr(input == &Bench::positions ? "no pose: no LOCAL_POSITION_NED" : "no pose: no ATTITUDE"));
+    EXPECT_NE(bench.heartbeats.back().state, kActiveState);
+  }
+}
+
+TEST(AutopilotLink, WhatTheReceiverSaidIsNotKeptForEver) {
+  Bench bench;
+  bench.gnss = true;
+  bench.run(2);
+  ASSERT_TRUE(bench.link().report().gnss);
+  EXPECT_EQ(bench.link().report().gnss->satellites, 11);
+  bench.gnss = false;
+  bench.run(2.5);
+  EXPECT_TRUE(bench.link().report().gnss);
+  bench.run(1);
+  EXPECT_FALSE(bench.link().report().gnss);
+}
+
 /// They are of the exposure, a quarter of a second ago; in the meantime the vehicle has moved and turned.
 TEST(AutopilotLink, PointsAreThoseOfWhereTheVehicleIsByNow) {
   LinkOptions options;
@@ -420,6 +315,68 @@ TEST(AutopilotLink, TakesAnotherAutopilotOnceTheFirstIsGone) {
   EXPECT_EQ(bench.link().report().autopilot->system, 7);  // of another vehicle, for all that we know
   bench.run(4);
   EXPECT_EQ(bench.link().report().autopilot->system, 9);
+  EXPECT_EQ(bench.link().report().jumps, 1U) << "its poses are of another world";
+}
+
+/// Its pre-arm check wants a proximity sensor that speaks; what is said is nothing, and only at rest.
+TEST(AutopilotLink, ArduPilotCanBeArmedAtRest) {
+  Bench bench;
+  bench.kind = ardupilot_kind;
+  bench.armed = bench.depth = false;
+  bench.run(5);
+  const Time first = bench.now();
+  bench.sectors.clear();
+  bench.run(3);
+  ASSERT_FALSE(bench.sectors.empty());
+  Time last = first;
+  for (const Time time : bench.sectors) EXPECT_LT(seconds_between(std::exchange(last, time), time), 0.4);
+  EXPECT_LT(seconds_between(last, bench.now()), 0.4);
+  for (const std::uint16_t d : bench.last_sectors.distances) EXPECT_EQ(d, kUnknownDistance);
+  EXPECT_EQ(bench.link().report().sectors_sent, 0U);
+  EXPECT_GE(bench.link().report().sectors_empty, bench.sectors.size());
+  EXPECT_NE(bench.heartbeats.back().state, kActiveState);
+  EXPECT_EQ(bench.link().report().missing, Missing::depth) << "that is still what the pilot is told";
+  // What is really wrong keeps it from being armed.
+  for (bool Bench::*const input : {&Bench::camera, &Bench::poses, &Bench::mapper, &Bench::heartbeat}) {
+    bench.*input = false;
+    bench.run(2);
+    bench.sectors.clear();
+    bench.run(2);
+    EXPECT_TRUE(bench.sectors.empty());
+    bench.*input = true;
+    bench.run(3);
+    bench.sectors.clear();
+    bench.run(1);
+    EXPECT_FALSE(bench.sectors.empty());
+  }
+  bench.armed = true;
+  bench.run(1);  // until its heartbeat says so
+  bench.sectors.clear();
+  bench.run(5);
+  EXPECT_TRUE(bench.sectors.empty());
+}
+
+TEST(AutopilotLink, NothingIsSentToPx4AtRest) {
+  Bench bench;
+  bench.armed = bench.depth = false;
+  bench.run(6);
+  EXPECT_TRUE(bench.sectors.empty());
+}
+
+TEST(AutopilotLink, WarnsOfEachThingOnce) {
+  Bench bench;
+  bench.run(5);
+  bench.texts.clear();
+  for (int i = 0; i < 300; ++i) {
+    bench.link().warn(i % 2 == 0 ? "the map cannot be saved" : "nothing more is recorded");
+    bench.camera = i < 100;
+    bench.run(0.01);
+  }
+  ASSERT_EQ(bench.texts.size(), 3U);
+  EXPECT_EQ(bench.texts[0].second, "PADE: the map cannot be saved");
+  EXPECT_EQ(bench.texts[1].second, "PADE: nothing more is recorded");
+  EXPECT_THAT(bench.texts[2].second, HasSubstr("no image from the camera"));
+  EXPECT_GE(seconds_between(bench.texts[0].first, bench.texts[1].first), 0.99);
 }
 
 TEST(AutopilotLink, SaysThatItEnds) {

@@ -153,6 +153,89 @@ TEST(AutopilotPoses, AStepThatItsVelocityDoesNotExplainIsAJump) {
   EXPECT_EQ(jumped->at(at_ms(1500)).jumps, 1U);
 }
 
+/// While the position is invalid PX4 does not send it, and sets it anew when it is back: the usual step lies
+/// in a gap.
+TEST(AutopilotPoses, AStepWithinAGapIsAJump) {
+  struct Case {
+    double gap;         // s
+    float step, speed;  // m, m/s
+    float turn;         // rad
+    bool jump;
+  };
+  const Case cases[] = {
+      {0.5, 0, 15, 0, false}, {0.5, 3, 5, 0, true},  {0.5, -0.5F, 5, 0, false}, {1.5, 0, 15, 0, false},
+      {1.5, 20, 2, 0, true},  {1.5, 2, 2, 0, false},  // it may have sped up
+      {2.5, 0, 0, 0, true},   {60, 0, 2, 0, true},   {0.5, 0, 2, 1.5F, true},   {0.5, 0, 2, 0.3F, false},
+  };
+  for (const Case& c : cases) {
+    for (const bool attitudes_too : {true, false}) {
+      AutopilotPoses poses(PoseMessages::estimate);
+      std::uint32_t ms = 1000;
+      float north = 0;
+      const auto fly = [&](double seconds, bool attitudes, bool positions, float turn) {
+        for (int i = 0; i < std::lround(seconds / 0.04); ++i, ms += 40, north += 0.04F * c.speed) {
+          if (attitudes) add_to(poses, facing(ms, turn));
+          if (positions) add_to(poses, mavlink::LocalPositionNed{ms, north, 0, 0, c.speed, 0, 0});
+        }
+      };
+      fly(1, true, true, 0);
+      fly(c.gap, !attitudes_too, false, 0);
+      north += c.step;
+      fly(1, true, true, attitudes_too ? c.turn : 0);
+      if (c.turn > 0 && !attitudes_too) continue;
+      EXPECT_EQ(poses.jumps(), c.jump ? 1U : 0U) << c.gap << " s, " << c.step << " m, " << c.turn << " rad";
+      const PoseAnswer answer = poses.at(at_ms(ms - 500));
+      ASSERT_EQ(answer.kind, Kind::valid);
+      EXPECT_EQ(answer.jumps, c.jump ? 1U : 0U);
+    }
+  }
+}
+
+/// Its resets are counted by ODOMETRY itself, so a gap alone says nothing.
+TEST(AutopilotPoses, AGapInOdometryIsNoJumpUnlessItsCounterSaysSo) {
+  AutopilotPoses poses(PoseMessages::odometry);
+  add_to(poses, odometry(1000, 0, 7));
+  add_to(poses, odometry(11'000, 30, 7));
+  EXPECT_EQ(poses.jumps(), 0U);
+  add_to(poses, odometry(21'000, 60, 8));
+  EXPECT_EQ(poses.jumps(), 1U);
+}
+
+/// Where a position that was set anew is the first to come after a gap, the attitude is not what is missing.
+TEST(AutopilotPoses, AJumpIsNoMissingMessage) {
+  AutopilotPoses poses(PoseMessages::estimate);
+  add_to(poses, facing(1000, 0));
+  EXPECT_EQ(poses.missing(), "no LOCAL_POSITION_NED");
+  add_to(poses, mavlink::LocalPositionNed{1000, 0, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.missing(), "");
+  for (std::uint32_t ms = 1040; ms <= 3000; ms += 40) add_to(poses, facing(ms, 0));
+  EXPECT_EQ(poses.missing(), "no LOCAL_POSITION_NED");
+  add_to(poses, mavlink::LocalPositionNed{3010, 20, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.jumps(), 1U);
+  EXPECT_EQ(poses.missing(), "");
+  for (std::uint32_t ms = 3050; ms <= 3500; ms += 40)
+    add_to(poses, mavlink::LocalPositionNed{ms, 20, 0, 0, 0, 0, 0});
+  EXPECT_EQ(poses.missing(), "no ATTITUDE") << "now it is";
+}
+
+TEST(AutopilotPoses, AnotherAutopilotIsAJump) {
+  AutopilotPoses poses(PoseMessages::estimate);
+  poses.listen_to({1, 1, px4_kind, 2});
+  add_to(poses, facing(1000, 0));
+  add_to(poses, mavlink::LocalPositionNed{1000, 0, 0, 0, 0, 0, 0});
+  poses.listen_to({1, 1, px4_kind, 2});  // each heartbeat
+  EXPECT_EQ(poses.jumps(), 0U);
+  poses.listen_to({2, 1, ardupilot_kind, 2});
+  EXPECT_EQ(poses.jumps(), 1U);
+  EXPECT_EQ(poses.newest().nanoseconds, 0);
+  // It sends angles and no quaternions.
+  add_to(poses, mavlink::Attitude{1040, 0, 0, 0.5F, 0, 0, 0});
+  add_to(poses, mavlink::LocalPositionNed{1040, 0, 0, 0, 0, 0, 0});
+  const PoseAnswer answer = poses.at(at_ms(1040));
+  ASSERT_EQ(answer.kind, Kind::valid);
+  EXPECT_EQ(answer.jumps, 1U);
+}
+
 TEST(AutopilotPoses, AClockThatGoesBackIsAJump) {
   AutopilotPoses poses(PoseMessages::estimate);
   add_to(poses, facing(90'000, 0));

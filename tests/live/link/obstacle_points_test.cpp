@@ -183,7 +183,10 @@ class ObstaclePoints : public testing::Test {
     }
   }
   std::vector<Vector3d> points_of(const std::vector<Vector3d>& centres, const Pose& body) {
-    return obstacle_points(*view_of(centres), body, options_of_points(), camera_of_points(), mounting());
+    const auto points =
+        obstacle_points(*view_of(centres), body, options_of_points(), camera_of_points(), mounting());
+    EXPECT_TRUE(points);
+    return points.value_or(std::vector<Vector3d>{});
   }
 
   std::mt19937 random_{7};
@@ -277,9 +280,27 @@ TEST_F(ObstaclePoints, NearerThanTheLeastAreSentAsTheLeast) {
   options.min_distance = 1.5;
   const auto points =
       obstacle_points(*view_of({centre_of_voxel({0.8, 0, 0})}), {}, options, camera_of_points(), mounting());
+  ASSERT_TRUE(points);
   ArduPilot autopilot;
-  autopilot.take(obstacle_messages(points, 5000, options), 0);
+  autopilot.take(obstacle_messages(*points, 5000, options), 0);
   EXPECT_NEAR(autopilot.shown()[face_at(0, 0)], 1.5, 0.01);
+}
+
+/// Where a map ends, nobody may say that nothing is near.
+TEST_F(ObstaclePoints, NobodySpeaksForWhatNoMapCanHold) {
+  constexpr double kBorder = 32768 * kVoxel;
+  const auto view = view_of({centre_of_voxel({5, 0, 0})});
+  for (const double sign : {-1.0, 1.0}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double beyond : {-12.0, -9.0, 0.0, 1.0, 500.0, 1e6, 1e15}) {
+        Pose body;
+        body.translation[axis] = sign * (kBorder + beyond);
+        const double reach = axis == 2 ? 3 : 10;
+        const auto points = obstacle_points(*view, body, options_of_points(), camera_of_points(), mounting());
+        EXPECT_EQ(points.has_value(), beyond < -reach) << sign << " " << axis << " " << beyond;
+      }
+    }
+  }
 }
 
 /// The boundary shows a frame as soon as its messages are there, and nothing of the frame before.

@@ -148,6 +148,14 @@ TEST(WebMessages, HealthIsTheSameAsJson) {
     EXPECT_THAT(json, HasSubstr(fmt::format("\"{}\": \"{}\"", key, value)));
 }
 
+TEST(SessionHealth, CountsEachPacketThatWasLost) {
+  HealthInputs inputs;
+  inputs.link.in.gaps = 2;
+  inputs.link.in.lost = 9;
+  const auto values = SessionHealth().of(inputs).values;
+  EXPECT_THAT(values, testing::Contains(testing::Pair("packets_lost", "9")));
+}
+
 Voxel voxel_at(double x, double y, double z, double side) {
   return {std::lround(x / side - 0.5), std::lround(y / side - 0.5), std::lround(z / side - 0.5)};
 }

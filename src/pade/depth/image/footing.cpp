@@ -19,7 +19,11 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 /// The columns of an image, along the vertical through the camera.
 class Columns {
  public:
-  Columns(const DepthImage& image, const Eigen::Vector3d& up) : image_(image), lean_(-up.x() / up.y()) {}
+  Columns(const DepthImage& image, const Camera& camera, const Eigen::Vector3d& up)
+      : image_(image),
+        camera_(camera),
+        ahead_((Eigen::Vector3d::UnitZ() - up.z() * up).normalized()),
+        lean_(-up.x() / up.y()) {}
 
   /// Of the pixel below (u, v) in its column; outside of the image where there is none.
   [[nodiscard]] cv::Point below(int u, int v) const { return {u - shift(v) + shift(v + 1), v + 1}; }
@@ -29,8 +33,16 @@ class Columns {
   [[nodiscard]] bool is_blank(cv::Point p) const {
     return image_.state.at<std::uint8_t>(p) == static_cast<std::uint8_t>(DepthState::no_texture);
   }
-  /// The lower quartile of the bounds of the first pixels with texture from `p` on downward; NaN where too
-  /// few have one.
+  /// The ray of a pixel, z = 1.
+  [[nodiscard]] Eigen::Vector3d ray(int u, int v) const {
+    return {(cell_centre(u, image_.window) - camera_.cx) / camera_.fx,
+            (cell_centre(v, image_.window) - camera_.cy) / camera_.fy, 1};
+  }
+  /// Metres ahead, level, per metre of depth: what is vertical is as far ahead all the way up. Not above
+  /// zero: behind the camera.
+  [[nodiscard]] float ahead(const Eigen::Vector3d& ray) const { return static_cast<float>(ray.dot(ahead_)); }
+  /// The lower quartile of how far ahead the bounds of the first pixels with texture are, from `p` on
+  /// downward; NaN where too few have one.
   [[nodiscard]] float footing(cv::Point p) const;
 
  private:
@@ -40,7 +52,9 @@ class Columns {
   }
 
   const DepthImage& image_;
-  double lean_;  // to the right per row upward
+  const Camera& camera_;
+  Eigen::Vector3d ahead_;  // level
+  double lean_;            // to the right per row upward
 };
 
 float Columns::footing(cv::Point p) const {
@@ -51,7 +65,8 @@ float Columns::footing(cv::Point p) const {
     if (is_blank(p)) continue;
     ++asked;
     const float bound = image_.bound.at<float>(p);
-    if (bound > 0) bounds[answers++] = bound;
+    const float at = bound * ahead(ray(p.x, p.y));
+    if (at > 0) bounds[answers++] = at;
   }
   if (answers < kFewest || 2 * answers < asked) return kNone;
   auto* const low = bounds.data() + answers / 4;  // edges and wrong matches make single bounds small
@@ -95,11 +110,10 @@ Status check(const FootingOptions& options) {
 void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vector3d& up,
                       const FootingOptions& options) {
   if (!options.on || image.bound.empty() || -up.y() < kSteepest || std::abs(up.x()) > -up.y()) return;
-  const Columns columns(image, up);
+  const Columns columns(image, camera, up);
   const int width = image.bound.cols;
   cv::Mat footing(image.bound.size(), CV_32FC1, cv::Scalar(kNone));
   for (int v = image.bound.rows - 1; v >= 0; --v) {
-    const double y = (cell_centre(v, image.window) - camera.cy) / camera.fy;
     auto* found = footing.ptr<float>(v);
     for (int u = 0; u < width; ++u) {
       const cv::Point below = columns.below(u, v);
@@ -109,11 +123,13 @@ void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vect
     fill_gaps(found, image.state.ptr<std::uint8_t>(v), width);
     for (int u = 0; u < width; ++u) {
       if (!(found[u] > 0)) continue;
-      const double x = (cell_centre(u, image.window) - camera.cx) / camera.fx;
-      const double climb = up.dot(Eigen::Vector3d(x, y, 1));  // m of height per m of depth
+      const Eigen::Vector3d ray = columns.ray(u, v);
+      const float ahead = columns.ahead(ray);
+      if (!(ahead > 0)) continue;
+      const double climb = up.dot(ray);  // m of height per m of depth
       const double most = climb > 0 ? options.headroom / climb : std::numeric_limits<double>::infinity();
       auto& bound = image.bound.at<float>(v, u);
-      const float free = std::min(found[u], static_cast<float>(most));
+      const float free = std::min(found[u] / ahead, static_cast<float>(most));
       if (!(bound >= free)) bound = free;
     }
   }

@@ -26,13 +26,13 @@ struct FootingOptions {
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const FootingOptions& options);
 
-/// Things stand on the ground. A blank wall begins where the ground before it ends, and is as far away all
-/// the way up; the sky begins at the horizon. So a pixel without texture gets the lower quartile of the
-/// bounds of the first pixels with texture straight below it (along the vertical through the camera, which a
-/// banked camera sees aslant); where fewer than half of them have a bound it gets that of the columns to both
-/// sides, since the patch is one surface. A pixel that looks up is free only up to `headroom` above the
-/// camera, since a blank ceiling comes nearer the farther one looks up. A bound that the pixel has, where it
-/// is greater, stays.
+/// Things stand on the ground. A blank wall begins where the ground before it ends, and is as far ahead,
+/// level, all the way up (as a depth only where the camera looks level); the sky begins at the horizon. So a
+/// pixel without texture gets the lower quartile of the level distances of the bounds of the first pixels
+/// with texture straight below it (along the vertical through the camera, which a banked camera sees aslant);
+/// where fewer than half of them have a bound it gets that of the columns to both sides, since the patch is
+/// one surface. A pixel that looks up is free only up to `headroom` above the camera, since a blank ceiling
+/// comes nearer the farther one looks up. A bound that the pixel has, where it is greater, stays.
 ///
 /// What this cannot see is a blank thing that hangs lower than `headroom` and has no contrast along its lower
 /// edge, or one that leans toward the camera. Indoors, leave it off.

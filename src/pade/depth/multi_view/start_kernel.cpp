@@ -72,7 +72,9 @@ struct Bilinear {
   if (p.last == nullptr) return rho;
   const V found = look_up(p, last, x, static_cast<float>(y), rho);
   const I agrees = I(abs(found - rho) < p.agreement * max(found, rho) + p.slack);
-  return select(agrees, found, rho);
+  // A pair in which neither would be seen to move, and which has measured nothing, does not disagree.
+  const I untold = ~I(z > 0.0F) & I(found < p.untold) & I(rho < p.untold);
+  return select(agrees | untold, found, rho);
 }
 
 }  // namespace

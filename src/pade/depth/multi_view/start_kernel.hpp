@@ -17,6 +17,7 @@ struct StartParameters {
   int width, height;       ///< of the image, the last one too
   float R[9], t[3];        ///< reference -> last camera
   float agreement, slack;
+  float untold;  ///< 1/m: what is less shows no parallax in the pair
 };
 
 /// @param depth  two-view depth of the row, m, NaN or 0 = none. @param flow  interleaved (u, v), px. @param

@@ -14,6 +14,7 @@ namespace pade::depth {
 namespace {
 
 constexpr float kEpipoleRadius = 5;     // px: nearer to the epipole the parallax of a pair says little
+constexpr float kUntold = 1.5F;         // px: less parallax of a pair does not gainsay what was found
 constexpr float kNearestDepth = 0.05F;  // m
 constexpr int kBoundRadius = 2;         // px
 constexpr float kTexture = 1.6F;        // least squared slopes, in those of noise
@@ -51,6 +52,7 @@ cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Ca
   p.height = flow.rows;
   p.agreement = static_cast<float>(options.agreement);
   p.slack = static_cast<float>(3 / (camera.fx * baseline));
+  p.untold = kUntold / (p.fx * t.norm());
   if (!last.empty()) {
     p.last = last.rho.ptr<float>();
     p.last_stride = static_cast<int>(last.rho.step1());

@@ -15,7 +15,7 @@ namespace pade::io {
 
 /// What a receiver says at one moment.
 struct GeodeticFix {
-  Time time;
+  Time time;                                       ///< of the measurement
   double latitude = 0;                             ///< degrees
   double longitude = 0;                            ///< degrees
   double height = 0;                               ///< m, above whatever the receiver counts from
@@ -32,6 +32,7 @@ struct GeodeticFix {
 /// where it is exactly 0 in all of ten fixes and more.
 /// @param fixes   at least one
 /// @param source  message or topic, for the remarks
+/// @param remarks  what had to be assumed is appended, one sentence each
 GnssLog local_log(std::span<const GeodeticFix> fixes, const std::string& source,
                   std::vector<std::string>& remarks);
 

@@ -46,7 +46,10 @@ class BagWriter : public RecordingWriter {
 
   [[nodiscard]] MessageEncoding encoding() const override { return MessageEncoding::ros1; }
 
-  Status write(std::string_view topic, std::string_view type, Time time, std::string_view message) override {
+  Status write(std::string_view topic, std::string_view type, Time measured,
+               std::string_view message) override {
+    // rosbag plays nothing that was recorded at 0, which stands for no time.
+    const Time time = std::max(measured, Time{1});
     const auto [known, added] = connections_.try_emplace(std::string(topic));
     Connection& connection = known->second;
     if (added) {

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/lasting_output.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
@@ -35,7 +36,8 @@ PartialFile::PartialFile(PartialFile&& other) noexcept
       place_(std::exchange(other.place_, {})),
       stream_(std::move(other.stream_)),
       size_(other.size_),
-      keep_(other.keep_) {}
+      keep_(other.keep_),
+      synced_(other.synced_) {}
 
 PartialFile::~PartialFile() {
   if (place_.empty() || keep_) return;
@@ -57,18 +59,25 @@ void PartialFile::overwrite(std::uint64_t at, std::string_view bytes) {
 
 Status PartialFile::flush() {
   stream_.flush();
-  if (stream_) return {};
-  return Error{fmt::format("{}: cannot be written (no space left?)", place_.string())};
+  if (!stream_) return Error{fmt::format("{}: cannot be written (no space left?)", place_.string())};
+  constexpr auto kPause = std::chrono::seconds(1);
+  const auto now = std::chrono::steady_clock::now();
+  if (!keep_ || now - synced_ < kPause) return {};
+  synced_ = now;
+  return sync_to_disk(place_);
 }
 
 Status PartialFile::commit() {
   if (Status status = flush(); !status) return status;
   stream_.close();
+  if (keep_) {
+    if (Status status = sync_to_disk(place_); !status) return status;
+  }
   std::error_code failure;
   fs::rename(place_, target_, failure);
   if (failure) return Error{fmt::format("{}: cannot be made: {}", target_.string(), failure.message())};
   place_.clear();
-  return {};
+  return keep_ ? sync_to_disk(fs::absolute(target_, failure).parent_path()) : Status();
 }
 
 Result<std::unique_ptr<RecordingWriter>> create_recording(const fs::path& file, Overwrite overwrite,

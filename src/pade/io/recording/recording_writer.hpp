@@ -1,6 +1,7 @@
 // Recordings of ROS written: rosbag 2.0 and MCAP.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
@@ -16,7 +17,7 @@
 namespace pade::io {
 
 /// A file beside its place, NAME.part, until it is done: then it gets its name. What is abandoned is removed,
-/// unless it is to be kept.
+/// unless it is to be kept; then a power cut does not take it either, but for the last second before flush().
 class PartialFile {
  public:
   static Result<PartialFile> create(const std::filesystem::path& target, Overwrite overwrite, bool keep);
@@ -40,6 +41,7 @@ class PartialFile {
   std::ofstream stream_;
   std::uint64_t size_ = 0;
   bool keep_ = false;
+  std::chrono::steady_clock::time_point synced_ = std::chrono::steady_clock::now();
 };
 
 /// Writes messages, chunk by chunk. Topics are told apart by their names.

@@ -166,10 +166,15 @@ Result<Calibration> parse_calibration(std::string_view text, const std::string& 
   }
   if (dialect::is_kalibr(*root)) return dialect::read_kalibr(*root, file, camera);
   if (dialect::is_orb_slam(*root)) return dialect::read_orb_slam(*root, file, camera);
-  if (dialect::is_vins(*root)) return dialect::read_vins(*root, file);
-  if (dialect::is_euroc(*root)) return dialect::read_euroc(*root, file);
-  if (dialect::is_camera_info(*root)) return dialect::read_camera_info(*root, file);
-  if (dialect::is_opencv(*root)) return dialect::read_opencv(*root, file, camera);
+  const bool vins = dialect::is_vins(*root), euroc = dialect::is_euroc(*root);
+  const bool ros = dialect::is_camera_info(*root);
+  if (!vins && !euroc && !ros && dialect::is_opencv(*root)) {
+    return dialect::read_opencv(*root, file, camera);
+  }
+  if (camera > 0) return dialect::one_camera_only(file, camera);
+  if (vins) return dialect::read_vins(*root, file);
+  if (euroc) return dialect::read_euroc(*root, file);
+  if (ros) return dialect::read_camera_info(*root, file);
   return read_camera_yaml(*root, file);
 }
 

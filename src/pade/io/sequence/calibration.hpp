@@ -50,7 +50,7 @@ std::string_view lens_name(Distortion model);
 /// ORB-SLAM and VINS, KITTI's calib.txt and calib_cam_to_cam.txt, COLMAP's cameras.txt. Every field that is
 /// used is checked; the error names file, line, field, what was found and what was expected. Fields that look
 /// like a lens, a camera model or a mounting and are not understood are refused, never left out. `camera`
-/// chooses where a file holds several, from 0.
+/// chooses where a file holds several, from 0; a number that the file does not have is refused.
 Result<Calibration> read_calibration(const std::filesystem::path& file, int camera = 0);
 /// The same from text; `file` is the name in messages.
 Result<Calibration> parse_calibration(std::string_view text, const std::string& file, int camera = 0);

@@ -129,8 +129,10 @@ Status compute_poses(const PoseSource& source, const fs::path& folder, const std
   return {};
 }
 
-/// Gives every frame the depth image nearest in time.
-void associate_truth(std::vector<FrameEntry>& frames, std::vector<StampedFile> depth, double largest_gap) {
+/// Gives every frame the depth image nearest in time. Returns how far the nearest of all is from its frame,
+/// s.
+double associate_truth(std::vector<FrameEntry>& frames, std::vector<StampedFile> depth, double largest_gap) {
+  double least = std::numeric_limits<double>::infinity();
   std::stable_sort(depth.begin(), depth.end(),
                    [](const StampedFile& a, const StampedFile& b) { return a.time < b.time; });
   for (FrameEntry& frame : frames) {
@@ -140,8 +142,11 @@ void associate_truth(std::vector<FrameEntry>& frames, std::vector<StampedFile> d
     if (nearest != depth.begin() && (nearest == depth.end() || distance(nearest - 1) <= distance(nearest))) {
       --nearest;
     }
-    if (nearest != depth.end() && distance(nearest) <= largest_gap) frame.depth = nearest->file;
+    if (nearest == depth.end()) continue;
+    least = std::min(least, distance(nearest));
+    if (distance(nearest) <= largest_gap) frame.depth = nearest->file;
   }
+  return least;
 }
 
 /// At most `most` of the frames, evenly spread, first and last included.
@@ -199,13 +204,8 @@ Status enough_usable(std::size_t usable, std::size_t listed, const ReadReport& r
 
 /// Names inside the sequence are given relative to it.
 void make_relative(ReadReport& report, const fs::path& folder) {
-  const std::string prefix = (folder / "").string();
-  for (Skipped& entry : report.skipped) {
-    if (entry.file.starts_with(prefix)) entry.file.erase(0, prefix.size());
-    if (entry.reason.starts_with(prefix + entry.file + ": ")) {
-      entry.reason.erase(0, prefix.size() + entry.file.size() + 2);
-    }
-  }
+  for (Skipped& entry : report.skipped)
+    entry = skipped_in(folder, std::move(entry.file), std::move(entry.reason));
 }
 
 }  // namespace
@@ -314,13 +314,27 @@ Status Sequence::Data::make_mask() {
 }
 
 void Sequence::Data::choose_truth() {
-  if (listing.depth.empty()) return;
+  if (listing.depth.empty()) {
+    if (const std::size_t files = files_in(listing.depth_folder); files > 0) {
+      report.skip(listing.depth_folder.string(),
+                  fmt::format("found {} files in it and no depth image, expected true depth as in "
+                              "docs/sequences.md, or nothing",
+                              files));
+    }
+    return;
+  }
   if (!listing.calibration.depth_scale) {
     report.skip((folder / "depth").string(),
                 "field depth_scale is missing in the calibration, expected it to read true depth");
     return;
   }
-  associate_truth(frames, listing.depth, options.largest_truth_gap);
+  const double nearest = associate_truth(frames, listing.depth, options.largest_truth_gap);
+  if (std::all_of(frames.begin(), frames.end(), [](const FrameEntry& f) { return f.depth.empty(); })) {
+    report.skip(listing.depth_folder.string(),
+                fmt::format("found {} depth images, none within {:g} s of a frame (the nearest is {:.3g} s "
+                            "off), expected the times of the frames",
+                            listing.depth.size(), options.largest_truth_gap, nearest));
+  }
 }
 
 void Sequence::Data::choose_world() {
@@ -446,6 +460,7 @@ Sequence::~Sequence() = default;
 std::size_t Sequence::size() const { return data_->frames.size(); }
 Time Sequence::time(std::size_t i) const { return data_->frames[i].time; }
 const fs::path& Sequence::image_file(std::size_t i) const { return data_->frames[i].image; }
+const fs::path& Sequence::depth_file(std::size_t i) const { return data_->frames[i].depth; }
 const Pose& Sequence::pose(std::size_t i) const { return data_->frames[i].T_world_camera; }
 const Camera& Sequence::camera() const { return data_->camera; }
 const Camera& Sequence::raw_camera() const { return data_->raw_camera; }

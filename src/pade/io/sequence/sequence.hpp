@@ -107,7 +107,9 @@ class Sequence {
   /// counts it, and asks check() whether to go on.
   [[nodiscard]] Result<Frame> frame(std::size_t i) const;
 
-  [[nodiscard]] bool has_truth() const;
+  [[nodiscard]] bool has_truth() const;  ///< any frame has a depth image, readable or not
+  /// The depth image of frame i; empty where none is near in time.
+  [[nodiscard]] const std::filesystem::path& depth_file(std::size_t i) const;
   /// True depth of frame i on the grid of the undistorted image: CV_32FC1, metres along the optical axis, NaN
   /// = none. Error if no depth image is near in time or it cannot be read.
   [[nodiscard]] Result<cv::Mat> truth(std::size_t i) const;

@@ -81,8 +81,8 @@ class Device {
     return good;
   }
 
-  /// The stamp of the last frame was not of the monotonic clock.
-  [[nodiscard]] bool has_other_clock() const { return other_clock_; }
+  /// Frames so far whose stamps were not of the monotonic clock.
+  [[nodiscard]] std::size_t of_other_clock() const { return of_other_clock_; }
 
  private:
   Device() = default;
@@ -93,6 +93,7 @@ class Device {
         (capability.capabilities & V4L2_CAP_STREAMING) == 0) {
       return Error{fmt::format("{}: found no camera that streams, expected one of V4L2", name)};
     }
+    std::string other_size;
     for (const std::uint32_t wanted : kFormats) {
       v4l2_format format{};
       format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -109,9 +110,11 @@ class Device {
       const bool size = format_.width == static_cast<std::uint32_t>(camera.width) &&
                         format_.height == static_cast<std::uint32_t>(camera.height);
       if (size) return {};
-      return Error{fmt::format("{}: gives {} x {}, expected the calibration's {} x {}", name, format_.width,
-                               format_.height, camera.width, camera.height)};
+      // Cameras have sizes compressed that a bus is too slow for otherwise.
+      other_size = fmt::format("{}: gives {} x {}, expected the calibration's {} x {}", name, format_.width,
+                               format_.height, camera.width, camera.height);
     }
+    if (!other_size.empty()) return Error{other_size};
     return Error{fmt::format("{}: gives none of the formats GREY, YUYV and MJPEG", name)};
   }
 
@@ -162,14 +165,14 @@ class Device {
 
   [[nodiscard]] bool take(const v4l2_buffer& buffer, LiveFrame& frame) {
     const bool monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-    if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || !monotonic || buffer.index >= buffers_.size())
-      return false;
+    if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || buffer.index >= buffers_.size()) return false;
     frame.time = {static_cast<std::int64_t>(buffer.timestamp.tv_sec) * 1'000'000'000 +
                   static_cast<std::int64_t>(buffer.timestamp.tv_usec) * 1000};
-    if (frame.time.nanoseconds == 0) return false;
     constexpr double kFarthest = 1;  // s
-    other_clock_ = std::abs(seconds_between(frame.time, now_of_ours())) > kFarthest;
-    if (other_clock_) return false;
+    if (!monotonic || std::abs(seconds_between(frame.time, now_of_ours())) > kFarthest) {
+      ++of_other_clock_;
+      return false;
+    }
     const int width = static_cast<int>(format_.width);
     const int height = static_cast<int>(format_.height);
     const std::size_t bytes = buffer.bytesused;
@@ -192,7 +195,7 @@ class Device {
   }
 
   int number_ = -1;
-  bool other_clock_ = false;
+  std::size_t of_other_clock_ = 0;
   v4l2_pix_format format_{};
   std::vector<std::pair<void*, std::size_t>> buffers_;
 };
@@ -210,13 +213,18 @@ class V4l2Source : public FrameSource {
   Outcome next(LiveFrame& frame, int milliseconds) override {
     if (!device_ && !reopen(milliseconds)) return Outcome::nothing;
     bool lost = false;
+    const std::size_t before = device_->of_other_clock();
     const bool come = device_->next(frame, milliseconds, lost);
+    const bool refused = device_->of_other_clock() != before;
     const auto now = std::chrono::steady_clock::now();
-    if (come) come_ = now;
-    other_clock_ = device_->has_other_clock();
-    // Cameras on USB that hang come back when they are opened again.
+    if (come || refused) {
+      come_ = now;
+      other_clock_ = refused;
+    }
+    // Cameras on USB that hang come back when they are opened again; one whose stamps are of no use does not
+    // hang.
     constexpr auto kPatience = std::chrono::seconds(1);
-    const bool hangs = now - std::max(come_, tried_) > kPatience && !other_clock_;
+    const bool hangs = now - std::max(come_, tried_) > kPatience;
     if (lost || hangs) {
       device_.reset();
     }

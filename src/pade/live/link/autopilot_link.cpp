@@ -23,7 +23,9 @@ constexpr std::uint8_t kVersion = 3;             // of MAVLink, as all heartbeat
 constexpr std::uint8_t kWarning = 4;             // MAV_SEVERITY
 constexpr std::uint8_t kInformation = 6;
 constexpr std::uint16_t kSetMessageInterval = 511;  // MAV_CMD_SET_MESSAGE_INTERVAL
+constexpr std::uint8_t kArmed = 128;                // MAV_MODE_FLAG_SAFETY_ARMED
 constexpr double kOldest = 0.3;                     // age of a frame behind sectors, s
+constexpr double kBetweenTexts = 1;                 // s
 
 Time later(Time time, double seconds) {
   return {time.nanoseconds + static_cast<std::int64_t>(seconds * 1e9)};
@@ -73,10 +75,13 @@ void AutopilotLink::step(Time now, const Progress& progress) {
   }
   report_.in = parser_.counts();
   refresh_report(now);
+  if (is_alone()) return send_health(now, progress);
   if (!report_.autopilot) return;
   ask(now);
   send_sectors(now);
+  send_warning(now);
   send_health(now, progress);
+  send_for_arming(now);
 }
 
 void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
@@ -86,9 +91,11 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     constexpr double kGone = 5;  // s
     const bool same = report_.autopilot && report_.autopilot->system == frame.system;
     if (!same && report_.autopilot && seconds_between(heard_, now) < kGone) return;  // of another vehicle
+    if (!same && report_.autopilot) clock_ = LinkClock();
     if (!same)
       report_.autopilot = Autopilot{frame.system, frame.component, heartbeat->autopilot, heartbeat->type};
     heard_ = now;
+    armed_ = (heartbeat->base_mode & kArmed) != 0;
     poses_->listen_to(*report_.autopilot);
     port_->answer_sender();
     sender_.system = frame.system;  // PX4 drops what another system sends
@@ -106,8 +113,10 @@ void AutopilotLink::take(const mavlink::Frame& frame, Time now) {
     if (ours && ack->result != 0 && ack->result != kInProgress)
       report_.refused = fmt::format("command {} (result {})", ack->command, ack->result);
   }
-  if (const auto gnss = mavlink::unpack<mavlink::GpsRawInt>(frame))
+  if (const auto gnss = mavlink::unpack<mavlink::GpsRawInt>(frame)) {
     report_.gnss = GnssState{gnss->fix_type, gnss->satellites_visible};
+    gnss_heard_ = now;
+  }
   poses_->add(frame);
 }
 
@@ -169,8 +178,19 @@ bool AutopilotLink::in_faces() const {
          report_.autopilot->kind == ardupilot_kind;
 }
 
+std::optional<Time> AutopilotLink::time_of_poses(Time ours) const {
+  return poses_->in_our_time() ? ours : clock_.to_autopilot(ours);
+}
+
+/// By our clock; empty: there is none.
+std::optional<Time> AutopilotLink::newest_pose() const {
+  const Time newest = poses_->newest();
+  if (newest.nanoseconds == 0) return std::nullopt;
+  return poses_->in_our_time() ? newest : clock_.to_ours(newest);
+}
+
 std::optional<Time> AutopilotLink::offered_pose_time() const {
-  return clock_.to_autopilot(later(offered_frame_, offered_ ? offered_->time_offset : 0));
+  return time_of_poses(later(offered_frame_, offered_ ? offered_->time_offset : 0));
 }
 
 bool AutopilotLink::send_level() {
@@ -208,22 +228,49 @@ void AutopilotLink::send_sectors(Time now) {
   } else if (in_faces() && offered_->points ? send_points() : offered_->level && send_level()) {
     ++report_.sectors_sent;
     progress_.sent = offered_frame_.nanoseconds;
+    obstacles_sent_ = now;
   }
   offered_.reset();
+}
+
+void AutopilotLink::send_for_arming(Time now) {
+  constexpr double kHeartbeat = 1.5, kPause = 0.2;  // s; ArduPilot waits for 0.5 s
+  const Missing missing = report_.missing;
+  const bool all_but_depth =
+      missing == Missing::nothing || missing == Missing::depth || missing == Missing::view;
+  if (report_.autopilot->kind != ardupilot_kind || armed_ || seconds_between(heard_, now) > kHeartbeat ||
+      !all_but_depth || seconds_between(obstacles_sent_, now) < kPause)
+    return;
+  mavlink::ObstacleDistance nothing = obstacle_distance_message({}, now, {});
+  nothing.distances.fill(kUnknownDistance);
+  if (!send(nothing)) return;
+  ++report_.sectors_empty;
+  obstacles_sent_ = now;
+}
+
+void AutopilotLink::warn(const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  if (warned_.insert(text).second) warnings_.push_back(text);
+}
+
+void AutopilotLink::send_warning(Time now) {
+  if (warnings_.empty() || now < next_text_) return;
+  say(kWarning, warnings_.front());
+  warnings_.pop_front();
+  next_text_ = later(now, kBetweenTexts);
 }
 
 /// A heartbeat each second, and at once where something has changed, but not more often than a line and a
 /// pilot can take.
 void AutopilotLink::send_health(Time now, const Progress& progress) {
-  constexpr double kBetweenHeartbeats = 0.1, kBetweenTexts = 1;  // s
-  const auto newest = clock_.to_ours(poses_->newest());
-  const bool any = poses_->newest().nanoseconds != 0 && newest.has_value();
-  progress_.synchronised = clock_.synchronised(now);
-  progress_.pose = any ? newest->nanoseconds : 0;
+  constexpr double kBetweenHeartbeats = 0.1;  // s
+  progress_.synchronised = poses_->in_our_time() || clock_.synchronised(now);
+  progress_.pose = newest_pose().value_or(Time{}).nanoseconds;
   const Missing missing = missing_now(now, progress, progress_);
   const bool changed = missing != report_.missing;
   report_.missing = missing;
   report_.poses_missing = missing == Missing::pose ? poses_->missing() : std::string();
+  if (is_alone()) return;
   if (const std::string text = text_of(report_); said_ != text && now >= next_text_) {
     say(missing == Missing::nothing ? kInformation : kWarning, text);
     said_ = text;
@@ -254,14 +301,14 @@ void AutopilotLink::end() {
 
 PoseAnswer AutopilotLink::pose_at(Time time) const {
   const std::lock_guard lock(mutex_);
-  const auto theirs = clock_.to_autopilot(time);
+  const auto theirs = time_of_poses(time);
   return theirs ? poses_->at(*theirs) : PoseAnswer{};
 }
 
 std::optional<Matrix6d> AutopilotLink::motion_covariance(Time t1, Time t2, const Pose& T_body_camera) const {
   const std::lock_guard lock(mutex_);
-  const auto theirs1 = clock_.to_autopilot(t1);
-  const auto theirs2 = clock_.to_autopilot(t2);
+  const auto theirs1 = time_of_poses(t1);
+  const auto theirs2 = time_of_poses(t2);
   if (!theirs1 || !theirs2) return std::nullopt;
   return poses_->motion_covariance(*theirs1, *theirs2, T_body_camera);
 }
@@ -270,6 +317,7 @@ void AutopilotLink::offer(const FrameObstacles& obstacles, Time frame) {
   const std::lock_guard lock(mutex_);
   const bool says_anything = obstacles.level || (in_faces() && obstacles.points);
   offered_.reset();
+  if (is_alone()) return;  // nobody wants them, so none is missing
   if (says_anything) offered_ = obstacles;
   offered_frame_ = frame;
   (says_anything ? progress_.offered : progress_.empty) = frame.nanoseconds;
@@ -282,6 +330,8 @@ void AutopilotLink::refresh_report(Time now) {
   report_.poses = poses_->count();
   report_.jumps = poses_->jumps();
   report_.poses_come = poses_->newest().nanoseconds != 0;
+  constexpr double kGnssGone = 3;  // s
+  if (seconds_between(gnss_heard_, now) > kGnssGone) report_.gnss.reset();
 }
 
 LinkReport AutopilotLink::report() const {

@@ -4,9 +4,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -37,7 +39,7 @@ enum class ObstacleMessages : std::uint8_t {
 
 /// Options of AutopilotLink.
 struct LinkOptions {
-  std::string port = "udp:14540";                        ///< udp:PORT, or a serial device
+  std::string port = "udp:14540";                        ///< udp:PORT, a serial device, or none
   int baud = 921600;                                     ///< of a serial device
   PoseMessages poses = PoseMessages::estimate;           ///< where poses come from
   double pose_rate = 30;                                 ///< Hz that the autopilot is asked for
@@ -45,12 +47,12 @@ struct LinkOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("port", self.port, "udp:PORT, or a serial device such as /dev/ttyAMA0");
+    field("port", self.port, "udp:PORT, a serial device such as /dev/ttyAMA0, or none: no autopilot");
     field("baud", self.baud, "of a serial device");
     field(
         "poses", self.poses,
         "estimate: ATTITUDE_QUATERNION (else ATTITUDE) and LOCAL_POSITION_NED; odometry: ODOMETRY; sensors: "
-        "IMU, GNSS, magnetometer and barometer in our own filter");
+        "IMU, GNSS, magnetometer and barometer in our own filter; dds: a topic of ROS 2 (dds.poses)");
     field("pose_rate", self.pose_rate, "Hz that the autopilot is asked for");
     field("obstacles", self.obstacles,
           "level: OBSTACLE_DISTANCE; faces: OBSTACLE_DISTANCE_3D, which ArduPilot alone knows");
@@ -74,11 +76,12 @@ struct LinkReport {
   std::string poses_missing;      ///< why there are none; empty if there are
   std::string poses_summary;      ///< what has come for them
   std::size_t jumps = 0;          ///< of the poses
-  std::optional<GnssState> gnss;  ///< empty: GPS_RAW_INT has not come
+  std::optional<GnssState> gnss;  ///< empty: GPS_RAW_INT has not come for three seconds
   bool poses_come = false;        ///< so that there are poses
   std::size_t sectors_sent = 0;   ///< frames whose obstacles were sent
   bool level_instead = false;     ///< of OBSTACLE_DISTANCE_3D, which this autopilot does not know
   std::size_t sectors_stale = 0;  ///< too old when their turn came, so not sent
+  std::size_t sectors_empty = 0;  ///< that said nothing, sent so that ArduPilot can be armed at rest
   std::size_t unsent = 0;         ///< packets that the port did not take
   std::string refused;            ///< the last request that the autopilot refused; empty if none
   Missing missing = Missing::autopilot;
@@ -95,12 +98,18 @@ struct FrameObstacles {
   double time_offset = 0;                              ///< time of the pose = time of the frame + this, s
 };
 
-/// One for each autopilot. step() belongs to one thread, all else to any.
+/// One for each autopilot. At rest there is no parallax, and ArduPilot refuses to be armed where nothing has
+/// come from its proximity sensor for half a second. So while its heartbeat says that it is disarmed, and all
+/// but depth is there, it is sent OBSTACLE_DISTANCE that says nothing of any sector; never once it is armed.
+/// step() belongs to one thread, all else to any.
 class AutopilotLink : public NavigationSource {
  public:
   /// @param navigator  of our own filter; both options such as check() accepts
   AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options,
                 const navigation::NavigatorOptions& navigator = {});
+  /// @param poses  where they come from instead
+  AutopilotLink(std::unique_ptr<Port> port, const LinkOptions& options, std::unique_ptr<PoseSource> poses)
+      : port_(std::move(port)), options_(options), poses_(std::move(poses)) {}
 
   /// Waits for bytes, at most so long, ms.
   void wait(int milliseconds) { port_->wait(milliseconds); }
@@ -114,6 +123,9 @@ class AutopilotLink : public NavigationSource {
   /// that were not sent are forgotten. Those that say nothing are not sent, since receivers would take them
   /// for a sign of health.
   void offer(const FrameObstacles& obstacles, Time frame);
+  /// Tells the pilot something that is no missing input, once however often it is asked for.
+  /// @param text  at most the 44 characters that a STATUSTEXT has left
+  void warn(const std::string& text);
   /// Says that there will be no more sectors. To be called when nobody calls step() any more.
   void end();
   [[nodiscard]] LinkReport report() const;
@@ -128,8 +140,13 @@ class AutopilotLink : public NavigationSource {
   bool send_points();
   void turn_to_newest_heading(mavlink::ObstacleDistance& sectors) const;
   [[nodiscard]] bool in_faces() const;
-  /// Of the autopilot's clock, of the poses of the frame that is offered.
+  [[nodiscard]] bool is_alone() const { return options_.port == no_port; }
+  [[nodiscard]] std::optional<Time> time_of_poses(Time ours) const;
+  [[nodiscard]] std::optional<Time> newest_pose() const;
+  /// By the clock of the poses, of those of the frame that is offered.
   [[nodiscard]] std::optional<Time> offered_pose_time() const;
+  void send_for_arming(Time now);
+  void send_warning(Time now);
   void send_health(Time now, const Progress& progress);
   void say(std::uint8_t severity, std::string_view text);
   void send_heartbeat(std::uint8_t state);
@@ -143,6 +160,9 @@ class AutopilotLink : public NavigationSource {
   mavlink::Sender sender_;
   Time next_question_, next_request_, next_heartbeat_, next_text_, earliest_heartbeat_;
   Time heard_;                        // the autopilot's heartbeat, last
+  bool armed_ = true;                 // by that heartbeat
+  Time gnss_heard_;                   // GPS_RAW_INT, last
+  Time obstacles_sent_;               // last, whether or not they said anything
   std::string said_;                  // in the last text
   std::vector<WantedMessage> asked_;  // how many had come when the streams were last asked for
   std::uint32_t last_stamp_ = 0;      // of points, ms
@@ -154,6 +174,8 @@ class AutopilotLink : public NavigationSource {
   std::optional<FrameObstacles> offered_;
   Time offered_frame_;
   LinkProgress progress_;
+  std::deque<std::string> warnings_;  // to be said
+  std::set<std::string> warned_;      // all so far
 };
 
 }  // namespace pade::live

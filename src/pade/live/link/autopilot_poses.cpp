@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/live/link/bracket.hpp"
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
 
@@ -17,8 +18,16 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using mavlink::unpack;
 
-constexpr double kKept = 3;              // s
-constexpr double kFarthestApart = 0.25;  // s
+constexpr double kKept = 3;  // s
+
+/// How far a quantity may be off what its rates at both ends say, after so many seconds: beside the error and
+/// its growth what may change unseen between messages that are far apart. Below 0, so that nothing is
+/// explained, where that is too long.
+double explained(double dt, double error, double growth, double acceleration) {
+  constexpr double kTooLong = 2;  // s
+  const double unseen = dt > kFarthestPosesApart ? acceleration * dt * dt / 2 : 0;
+  return dt > kTooLong ? -1 : error + growth * dt + unseen;
+}
 
 Time since_start(std::uint32_t ms) { return {static_cast<std::int64_t>(ms) * 1'000'000}; }
 
@@ -34,29 +43,6 @@ Quaterniond from_angles(double roll, double pitch, double yaw) {
          Eigen::AngleAxisd(roll, Vector3d::UnitX());
 }
 
-/// Where a time lies among samples.
-struct Bracket {
-  PoseAnswer::Kind kind = PoseAnswer::Kind::not_yet;
-  std::size_t after = 0;  ///< index of the sample at or behind the time
-  double share = 0;       ///< of the way to it from the one before
-  std::string_view why;
-};
-
-template <class Samples>
-Bracket bracket(const Samples& samples, Time time) {
-  using Kind = PoseAnswer::Kind;
-  if (samples.empty() || samples.back().time < time) return {};
-  const auto after =
-      std::find_if(samples.begin(), samples.end(), [&](const auto& sample) { return sample.time >= time; });
-  const auto index = static_cast<std::size_t>(after - samples.begin());
-  if (after->time == time) return {Kind::valid, index, 1, {}};
-  if (index == 0) return {Kind::never, 0, 0, "the image is older than the poses"};
-  const auto& before = samples[index - 1];
-  const double gap = seconds_between(before.time, after->time);
-  if (gap > kFarthestApart) return {Kind::never, 0, 0, "a gap in the poses"};
-  return {Kind::valid, index, seconds_between(before.time, time) / gap, {}};
-}
-
 }  // namespace
 
 template <class Samples, class Value>
@@ -66,6 +52,16 @@ bool AutopilotPoses::push(Samples& samples, Time time, const Value& value) {
   samples.push_back({time, value});
   while (seconds_between(samples.front().time, time) > kKept) samples.pop_front();
   return true;
+}
+
+void AutopilotPoses::listen_to(const Autopilot& autopilot) {
+  const bool same =
+      autopilot_ && autopilot_->system == autopilot.system && autopilot_->component == autopilot.component;
+  if (same) return;
+  if (autopilot_) jump();
+  autopilot_ = autopilot;
+  quaternions_ = false;
+  reset_counter_ = -1;
 }
 
 void AutopilotPoses::jump() {
@@ -83,10 +79,12 @@ void AutopilotPoses::add_attitude(Time time, const Quaterniond& q_ned_frd, doubl
   const Quaterniond turn = (R_enu_ned * q_ned_frd * R_frd_flu).normalized();
   if (!attitudes_.empty()) {
     // A heading that is set anew: no vehicle turns by that much and says that it does not.
-    constexpr double kUnsaid = 0.15;  // rad
+    constexpr double kUnsaid = 0.15;      // rad
+    constexpr double kUnseenTurning = 3;  // rad/s^2
     const double dt = seconds_between(attitudes_.back().time, time);
-    const double most = std::max(rate_, rate) * dt + kUnsaid;  // NaN: compares as false
-    if (dt > 0 && dt <= kFarthestApart && attitudes_.back().value.angularDistance(turn) > most) jump();
+    const double most = explained(dt, kUnsaid, std::max(rate_, rate), kUnseenTurning);
+    const bool known = std::isfinite(rate_) && std::isfinite(rate);
+    if (known && dt > 0 && attitudes_.back().value.angularDistance(turn) > most) jump();
   }
   if (!push(attitudes_, time, turn)) return;
   rate_ = rate;
@@ -98,11 +96,13 @@ void AutopilotPoses::add_position(Time time, const Vector3d& ned, const Vector3d
   const Vector3d place(ned.y(), ned.x(), -ned.z());
   const Vector3d velocity(velocity_ned.y(), velocity_ned.x(), -velocity_ned.z());
   if (!positions_.empty()) {
-    constexpr double kUnsaid = 0.3;       // m
-    constexpr double kUnsaidSpeed = 0.5;  // m/s
+    constexpr double kUnsaid = 0.3;        // m
+    constexpr double kUnsaidSpeed = 0.5;   // m/s
+    constexpr double kUnseenSpeeding = 3;  // m/s^2
     const double dt = seconds_between(positions_.back().time, time);
     const Vector3d expected = positions_.back().value + dt / 2 * (velocity_ + velocity);
-    if (dt > 0 && dt <= kFarthestApart && (place - expected).norm() > kUnsaid + kUnsaidSpeed * dt) jump();
+    const double most = explained(dt, kUnsaid, kUnsaidSpeed, kUnseenSpeeding);
+    if (dt > 0 && expected.allFinite() && (place - expected).norm() > most) jump();
   }
   if (!push(positions_, time, place)) return;
   velocity_ = velocity;
@@ -183,9 +183,21 @@ std::vector<WantedMessage> AutopilotPoses::wanted(double pose_rate) const {
 }
 
 std::string AutopilotPoses::missing() {
-  if (newest().nanoseconds != 0) return {};
-  if (messages_ == PoseMessages::odometry) return "no ODOMETRY in LOCAL_NED";
-  return attitudes_come_ == 0 ? "no ATTITUDE" : "no LOCAL_POSITION_NED";
+  if (messages_ == PoseMessages::odometry)
+    return newest().nanoseconds != 0 ? std::string() : std::string("no ODOMETRY in LOCAL_NED");
+  constexpr double kStopped = 0.3;  // s; less than what is called stale
+  // After a jump either has to come anew, which takes the one a moment longer than the other.
+  const auto alone = [](const auto& samples, std::size_t others) {
+    return others == 0 || samples.empty() ||
+           seconds_between(samples.front().time, samples.back().time) > kStopped;
+  };
+  if (attitudes_.empty()) return alone(positions_, attitudes_come_) ? "no ATTITUDE" : "";
+  if (positions_.empty()) return alone(attitudes_, positions_come_) ? "no LOCAL_POSITION_NED" : "";
+  // Both have come; where one has stopped and the other goes on, it is no cable.
+  const double ahead = seconds_between(positions_.back().time, attitudes_.back().time);
+  if (ahead > kStopped) return "no LOCAL_POSITION_NED";
+  if (ahead < -kStopped) return "no ATTITUDE";
+  return {};
 }
 
 std::string AutopilotPoses::summary() {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,14 +21,17 @@ class AutopilotPoses : public PoseSource {
  public:
   explicit AutopilotPoses(PoseMessages messages) : messages_(messages) {}
 
+  /// Another one than before is a jump.
+  void listen_to(const Autopilot& autopilot) override;
   /// A message of the autopilot; others than those of poses change nothing.
   void add(const mavlink::Frame& frame) override;
   /// Between two messages: rotation and position each on their straight way from the one before to the one
   /// after. No pose is extrapolated, and none comes from messages more than 0.25 s apart.
   [[nodiscard]] PoseAnswer at(Time time) override;
   /// How often the estimate has jumped: as it says itself (reset counter of ODOMETRY), since its clock was
-  /// set back, or because a step or turn is not what its own velocity and rates say. Poses before are
-  /// forgotten.
+  /// set back, because a step or turn is not what its own velocity and rates say, over a gap in its messages
+  /// not what a vehicle can do in that time, or because there was none for two seconds: estimates are set
+  /// anew in gaps. ODOMETRY has its counter for all that. Poses before are forgotten.
   [[nodiscard]] std::size_t jumps() const override { return jumps_; }
   [[nodiscard]] std::size_t count() const override { return std::min(attitudes_come_, positions_come_); }
   [[nodiscard]] std::size_t attitudes() const { return attitudes_come_; }  ///< that came
@@ -38,6 +42,7 @@ class AutopilotPoses : public PoseSource {
   /// Of the newest pose that can be answered; the start of time if there is none.
   [[nodiscard]] Time newest() override;
   [[nodiscard]] std::vector<WantedMessage> wanted(double pose_rate) const override;
+  /// The message that has not come, or that has stopped while the other goes on.
   [[nodiscard]] std::string missing() override;
   [[nodiscard]] std::string summary() override;
 
@@ -58,6 +63,7 @@ class AutopilotPoses : public PoseSource {
   void jump();
 
   PoseMessages messages_;
+  std::optional<Autopilot> autopilot_;
   Attitudes attitudes_;
   Positions positions_;
   bool quaternions_ = false;                            // came: the angles are not needed

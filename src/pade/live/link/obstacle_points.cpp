@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "pade/live/reach.hpp"
 #include "pade/mapping/query/tile_tree.hpp"
 #include "pade/mapping/query/voxel_grid.hpp"
 
@@ -173,14 +174,13 @@ mavlink::ObstacleDistance3d message_of(const Vector3d& point, std::uint32_t time
 
 }  // namespace
 
-std::vector<Vector3d> obstacle_points(const mapping::MapView& view, const Pose& T_world_body,
-                                      const SectorOptions& options, const Camera& camera,
-                                      const Pose& T_body_camera) {
+std::optional<std::vector<Vector3d>> obstacle_points(const mapping::MapView& view, const Pose& T_world_body,
+                                                     const SectorOptions& options, const Camera& camera,
+                                                     const Pose& T_body_camera) {
   const mapping::TileTree& tiles = view.tiles();
-  const Vector3d& place = T_world_body.translation;
-  const double reach = options.max_distance;
-  const VoxelIndex low = mapping::voxel_beside(place - Vector3d(reach, reach, options.below), tiles.voxel);
-  const VoxelIndex high = mapping::voxel_beside(place + Vector3d(reach, reach, options.above), tiles.voxel);
+  const auto reach = Reach::around(T_world_body.translation, options, tiles.voxel);
+  if (!reach || !reach->addressed) return std::nullopt;
+  const VoxelIndex &low = reach->low, &high = reach->high;
   VoxelIndex first{}, last{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     first[axis] = std::max(low[axis] >> 3, tiles.bounds.first[axis]);

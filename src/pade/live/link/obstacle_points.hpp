@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,10 +22,12 @@ namespace pade::live {
 /// @param T_world_body  world ENU, body FLU
 /// @param camera        undistorted. @param T_body_camera  its mounting
 /// @return points in the body's frame (FLU), m: in the direction of a part of the voxel, as near as its
-/// nearest part and not nearer than options.min_distance; at most options.max_distance away
-std::vector<Eigen::Vector3d> obstacle_points(const mapping::MapView& view, const Pose& T_world_body,
-                                             const SectorOptions& options, const Camera& camera,
-                                             const Pose& T_body_camera);
+/// nearest part and not nearer than options.min_distance; at most options.max_distance away. Empty where some
+/// of what lies within reach is beyond what the map can address: "nothing is near" would then be a guess
+std::optional<std::vector<Eigen::Vector3d>> obstacle_points(const mapping::MapView& view,
+                                                            const Pose& T_world_body,
+                                                            const SectorOptions& options,
+                                                            const Camera& camera, const Pose& T_body_camera);
 
 /// The nearest point for each face of ArduPilot's boundary (8 of 45° of bearing in 5 layers of 30°) as
 /// messages in the body's frame, forward-right-down. Without points it is one message beyond `max_distance`:

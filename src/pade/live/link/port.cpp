@@ -138,6 +138,13 @@ class SerialPort : public Port {
   std::chrono::steady_clock::time_point tried_;
 };
 
+class NoPort : public Port {
+ public:
+  void wait(int milliseconds) override { ::poll(nullptr, 0, milliseconds); }
+  std::size_t read(std::span<std::uint8_t> /*bytes*/) override { return 0; }
+  bool write(std::span<const std::uint8_t> /*bytes*/) override { return true; }
+};
+
 }  // namespace
 
 Result<std::unique_ptr<Port>> open_udp(int port) {
@@ -168,14 +175,15 @@ Result<std::unique_ptr<Port>> open_serial(const std::string& device, int baud) {
 Result<std::unique_ptr<Port>> open_port(const std::string& name, int baud) {
   constexpr std::string_view kUdp = "udp:";
   if (name.starts_with("/")) return open_serial(name, baud);
+  if (name == no_port) return std::unique_ptr<Port>(std::make_unique<NoPort>());
   if (name.starts_with(kUdp)) {
     int port = 0;
     const char* const end = name.data() + name.size();
     const auto [stop, code] = std::from_chars(name.data() + kUdp.size(), end, port);
     if (code == std::errc() && stop == end && port > 0 && port < 65536) return open_udp(port);
   }
-  return Error{
-      fmt::format("link.port: found \"{}\", expected udp:PORT or a device such as /dev/ttyAMA0", name)};
+  return Error{fmt::format(
+      "link.port: found \"{}\", expected udp:PORT, a device such as /dev/ttyAMA0, or none", name)};
 }
 
 }  // namespace pade::live

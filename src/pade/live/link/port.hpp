@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "pade/core/result.hpp"
 
@@ -35,7 +36,9 @@ Result<std::unique_ptr<Port>> open_udp(int port);
 /// A serial line, 8 bits without parity. Closed (the cable pulled out), it is tried anew twice a second.
 /// While it is open no other program opens it. Error: it cannot be opened, or it has no such speed.
 Result<std::unique_ptr<Port>> open_serial(const std::string& device, int baud);
-/// "udp:14540", or a device such as "/dev/ttyAMA0". Errors: those above; neither of the two.
+/// Without an autopilot: nothing comes, and nobody gets what is written.
+inline constexpr std::string_view no_port = "none";
+/// "udp:14540", a device such as "/dev/ttyAMA0", or no_port. Errors: those above; none of the three.
 Result<std::unique_ptr<Port>> open_port(const std::string& name, int baud);
 
 }  // namespace pade::live

@@ -23,6 +23,7 @@ enum class PoseMessages : std::uint8_t {
   estimate,  ///< ATTITUDE_QUATERNION (else ATTITUDE) and LOCAL_POSITION_NED
   odometry,  ///< ODOMETRY in the frame LOCAL_NED
   sensors,   ///< IMU, GNSS, magnetometer and barometer, in our own filter
+  dds,       ///< none: a topic of ROS 2 does (DdsPoses)
 };
 
 /// A pose, or why there is none.
@@ -45,7 +46,8 @@ struct WantedMessage {
   std::size_t come = 0;
 };
 
-/// Takes an autopilot's messages, answers with poses. All times are the autopilot's, since its start.
+/// Takes an autopilot's messages, answers with poses. All times are the autopilot's, since its start, unless
+/// the poses come from elsewhere.
 class PoseSource {
  public:
   PoseSource() = default;
@@ -53,6 +55,8 @@ class PoseSource {
   PoseSource& operator=(const PoseSource&) = delete;
   virtual ~PoseSource() = default;
 
+  /// Whether all times are those of our monotonic clock instead.
+  [[nodiscard]] virtual bool in_our_time() const { return false; }
   /// Whose messages are to come.
   virtual void listen_to(const Autopilot& /*autopilot*/) {}
   /// Messages that say nothing of the pose change nothing.
@@ -89,5 +93,6 @@ struct pade::EnumNames<pade::live::PoseMessages> {
   static constexpr std::array names = {
       std::pair{pade::live::PoseMessages::estimate, std::string_view("estimate")},
       std::pair{pade::live::PoseMessages::odometry, std::string_view("odometry")},
-      std::pair{pade::live::PoseMessages::sensors, std::string_view("sensors")}};
+      std::pair{pade::live::PoseMessages::sensors, std::string_view("sensors")},
+      std::pair{pade::live::PoseMessages::dds, std::string_view("dds")}};
 };

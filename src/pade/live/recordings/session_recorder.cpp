@@ -1,6 +1,8 @@
 #include "pade/live/recordings/session_recorder.hpp"
 
+#include <limits>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,50 +17,112 @@ namespace names = io::flight_names;
 
 constexpr std::size_t kMostFrames = 30;  // that wait
 
+/// What a file is called until it is finished.
+std::filesystem::path part_of(std::filesystem::path file) {
+  file += ".part";
+  return file;
+}
+
 }  // namespace
 
-Result<std::unique_ptr<SessionRecorder>> SessionRecorder::create(const std::filesystem::path& file,
-                                                                 const Camera& camera, const cv::Mat& mask) {
-  std::unique_ptr<SessionRecorder> recorder(new SessionRecorder(file, camera, mask));
-  if (Status status = recorder->open(); !status) return status.error();
+namespace fs = std::filesystem;
+
+std::uintmax_t RecorderLimits::space_beside(const fs::path& file) {
+  std::error_code failed;
+  const fs::space_info space = fs::space(fs::absolute(file, failed).parent_path(), failed);
+  return failed ? std::numeric_limits<std::uintmax_t>::max() : space.available;  // then writing will say so
+}
+
+Result<std::unique_ptr<SessionRecorder>> SessionRecorder::create(const fs::path& file, const Camera& camera,
+                                                                 const cv::Mat& mask,
+                                                                 const RecorderLimits& limits) {
+  std::unique_ptr<SessionRecorder> recorder(new SessionRecorder(file, camera, mask, limits));
+  if (Status status = recorder->keep_earlier(); !status) return status.error();
+  if (Status status = recorder->open(file); !status) return status.error();
   recorder->thread_ = std::thread([raw = recorder.get()] { raw->run(); });
   return recorder;
 }
 
-SessionRecorder::SessionRecorder(std::filesystem::path file, const Camera& camera, const cv::Mat& mask)
+SessionRecorder::SessionRecorder(fs::path file, const Camera& camera, const cv::Mat& mask,
+                                 const RecorderLimits& limits)
     : first_file_(std::move(file)),
       camera_(camera),
-      mask_(mask.empty() ? cv::Mat(camera.size(), CV_8UC1, cv::Scalar(255)) : mask.clone()) {}
+      mask_(mask.empty() ? cv::Mat(camera.size(), CV_8UC1, cv::Scalar(255)) : mask.clone()),
+      limits_(limits) {}
 
 SessionRecorder::~SessionRecorder() {
   if (thread_.joinable()) (void)finish();
 }
 
-std::filesystem::path SessionRecorder::file() const {
-  if (part_ == 1) return first_file_;
-  std::filesystem::path file = first_file_;
-  file.replace_filename(
-      fmt::format("{}-{}{}", first_file_.stem().string(), part_, first_file_.extension().string()));
-  return file;
-}
-
-std::size_t SessionRecorder::left_out() const {
+RecorderReport SessionRecorder::report() const {
   const std::lock_guard lock(mutex_);
-  return left_out_;
+  return report_;
 }
 
-Status SessionRecorder::open() {
-  auto writer = io::create_recording(file(), io::Overwrite::replace, true);
+/// NAME-1.mcap, or the next that is neither there nor begun.
+fs::path SessionRecorder::free_name(int from) const {
+  std::error_code ignored;
+  for (int number = from;; ++number) {
+    fs::path file = first_file_;
+    file.replace_filename(
+        fmt::format("{}-{}{}", first_file_.stem().string(), number, first_file_.extension().string()));
+    if (!fs::exists(file, ignored) && !fs::exists(part_of(file), ignored)) return file;
+  }
+}
+
+/// A session that begins again, after a power cut or a crash, leaves what was recorded before it.
+Status SessionRecorder::keep_earlier() {
+  for (const bool finished : {true, false}) {
+    const fs::path earlier = finished ? first_file_ : part_of(first_file_);
+    std::error_code failed;
+    if (!fs::is_regular_file(earlier, failed)) continue;
+    const fs::path name = free_name(1);
+    const fs::path kept = finished ? name : part_of(name);
+    fs::rename(earlier, kept, failed);
+    if (failed)
+      return Error{fmt::format("{}: the recording of an earlier session cannot be moved to {}: {}",
+                               earlier.string(), kept.filename().string(), failed.message())};
+    report_.earlier.push_back(kept.string());
+  }
+  return {};
+}
+
+Status SessionRecorder::open(const fs::path& file) {
+  {
+    const std::lock_guard lock(mutex_);
+    report_.file = file;
+  }
+  written_ = 0;
+  if (limits_.available(file) < limits_.least_space) {
+    end_for_want_of_space();
+    return {};
+  }
+  auto writer = io::create_recording(file, io::Overwrite::refuse, true);
   if (!writer) return writer.error();
   writer_ = std::move(*writer);
-  written_ = 0;
   return {};
+}
+
+/// While there is room for the map, and for the end of the recording.
+void SessionRecorder::end_for_want_of_space() {
+  const Status ended = writer_ == nullptr ? Status() : end();
+  const std::lock_guard lock(mutex_);
+  report_.ended =
+      fmt::format("the disk has less than {} MB left", (limits_.least_space + 999'999) / 1'000'000);
+  if (!ended && written_ > 0) report_.ended += fmt::format("; {}", ended.error().message);
+}
+
+void SessionRecorder::fail(const Status& status) {
+  if (status) return;
+  const std::lock_guard lock(mutex_);
+  status_ = status;
+  report_.ended = status.error().message;
 }
 
 void SessionRecorder::take(const MapperInput& input) {
   const std::lock_guard lock(mutex_);
   if (waiting_.size() >= kMostFrames) {
-    ++left_out_;
+    ++report_.left_out;
     return;
   }
   waiting_.push_back(std::make_unique<MapperInput>(input));
@@ -93,28 +157,43 @@ void SessionRecorder::run() {
     return input;
   };
   for (auto input = next(); input; input = next()) {
-    if (!status_) continue;
-    if (*input != nullptr) {
-      status_ = write(**input);
+    const bool is_frame = *input != nullptr;
+    if (report_.ended.empty() && is_frame && limits_.available(report_.file) < limits_.least_space)
+      end_for_want_of_space();
+    if (!report_.ended.empty()) {  // written by this thread alone
+      const std::lock_guard lock(mutex_);
+      report_.left_out += is_frame ? 1 : 0;
+    } else if (is_frame) {
+      fail(write(**input));
     } else if (written_ > 0) {
-      status_ = writer_->finish();
-      ++part_;
-      if (status_) status_ = open();
+      Status status = writer_->finish();
+      if (status) {
+        ++finished_;
+        last_file_ = report_.file;
+        status = open(free_name(2));
+      }
+      fail(status);
     }
   }
-  if (status_) status_ = end();
+  if (report_.ended.empty()) fail(end());
+  if (!status_ || finished_ > 0) return;
+  status_ = Error{report_.ended.empty()
+                      ? fmt::format("{}: nothing was recorded", first_file_.string())
+                      : fmt::format("{}: nothing was recorded: {}", first_file_.string(), report_.ended)};
 }
 
 /// The last file gets its name; one without a frame goes.
 Status SessionRecorder::end() {
-  if (written_ > 0) return writer_->finish();
-  std::filesystem::path part = file();
-  part += ".part";
+  if (written_ > 0) {
+    Status status = writer_->finish();
+    finished_ += status ? 1 : 0;
+    return status;
+  }
   writer_.reset();
   std::error_code failure;
-  std::filesystem::remove(part, failure);
-  if (part_ == 1) return Error{fmt::format("{}: nothing was recorded", file().string())};
-  --part_;
+  std::filesystem::remove(part_of(report_.file), failure);
+  const std::lock_guard lock(mutex_);
+  report_.file = last_file_;
   return {};
 }
 

@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "pade/io/recording/flight/flight_names.hpp"
 #include "pade/io/recording/messages/message_writer.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/web/pictures.hpp"
@@ -13,8 +12,6 @@
 
 namespace pade::live {
 namespace {
-
-namespace names = io::flight_names;
 
 constexpr auto kCdr = io::MessageEncoding::cdr;
 constexpr std::size_t kLatencies = 100;      // frames
@@ -168,6 +165,7 @@ std::size_t Publisher::missed(WebChannel channel, const Cursor& cursor) const {
 }
 
 std::shared_ptr<const std::string> Publisher::cloud_of(const Snapshot& snapshot) const {
+  const MessageTerms called = terms();
   std::vector<io::DisplayPoint> points;
   if (!snapshot.depth.empty()) {
     const auto every = std::sqrt(static_cast<double>(snapshot.depth.total()) / kMostPoints);
@@ -179,11 +177,12 @@ std::shared_ptr<const std::string> Publisher::cloud_of(const Snapshot& snapshot)
                                                    std::max(1, static_cast<int>(std::ceil(every))));
     for (const CloudPoint& point : cloud) points.push_back({point.x, point.y, point.z, point.sigma});
   }
-  return shared(io::write_point_cloud({snapshot.time, names::world_frame}, points));
+  return shared(io::write_point_cloud(called.header(snapshot.time, called.world), points));
 }
 
 std::shared_ptr<const std::string> Publisher::of_frame(WebChannel channel, const Snapshot& snapshot) const {
-  const io::MessageHeader header{snapshot.time, names::camera_frame};
+  const MessageTerms called = terms();
+  const io::MessageHeader header = called.header(snapshot.time, called.camera);
   const auto compressed = [&](const cv::Mat& picture) {
     return shared(io::write_compressed_image(header, "jpeg", jpeg_of(picture), kCdr));
   };
@@ -235,7 +234,8 @@ std::optional<Publisher::Message> Publisher::next_voxels(Cursor& cursor) {
   if (from != voxels_from_ || voxels_to_ == 0 || made_[i].version != voxels_.newest()) {
     std::uint64_t known = from;
     const auto markers = voxels_.since(known, kMostVoxels);
-    const io::MessageHeader header{voxels_time_, names::world_frame};
+    const MessageTerms called = terms();
+    const io::MessageHeader header = called.header(voxels_time_, called.world);
     made_[i] = {voxels_.newest(), {voxels_time_, shared(io::write_cubes(header, markers))}};
     voxels_from_ = from;
     voxels_to_ = known;
@@ -252,24 +252,31 @@ std::optional<Publisher::Message> Publisher::next(WebChannel channel, Cursor& cu
     case WebChannel::transforms:
       return made(channel, cursor, poses_, 0, [&]() -> Message {
         const auto& [time, T_world_body] = *pose_;
-        const io::NamedTransform transforms[] = {
-            {{time, names::world_frame}, names::body_frame, T_world_body},
-            {{time, names::body_frame}, names::camera_frame, T_body_camera_}};
+        const MessageTerms called = terms();
+        std::vector<io::NamedTransform> transforms;
+        if (called.states_body)
+          transforms.push_back({called.header(time, called.world), called.body, T_world_body});
+        if (called.states_camera)
+          transforms.push_back({called.header(time, called.body), called.camera, T_body_camera_});
         return {time, shared(io::write_transforms(transforms, kCdr))};
       });
     case WebChannel::path:
       return made(channel, cursor, path_.version(), kSlow, [&]() -> Message {
         const Time time = pose_ ? pose_->first : now_of_ours();
-        return {time, shared(io::write_path({time, names::world_frame}, path_.poses()))};
+        const MessageTerms called = terms();
+        std::vector<io::PathPose> poses = path_.poses();
+        for (io::PathPose& pose : poses) pose.time = called.header(pose.time, {}).stamp;
+        return {time, shared(io::write_path(called.header(time, called.world), poses))};
       });
     case WebChannel::sectors:
       return made(channel, cursor, sectors_, 0, [&]() -> Message {
-        return {distances_time_, shared(io::write_range_scan({distances_time_, names::body_frame},
+        const MessageTerms called = terms();
+        return {distances_time_, shared(io::write_range_scan(called.header(distances_time_, called.body),
                                                              scan_of(distances_, sector_options_)))};
       });
     case WebChannel::health:
       return made(channel, cursor, healths_, 0, [&]() -> Message {
-        return {health_time_, shared(io::write_diagnosis({health_time_, ""}, health_))};
+        return {health_time_, shared(io::write_diagnosis(terms().header(health_time_, {}), health_))};
       });
     default:
       break;

@@ -18,6 +18,8 @@
 #include "pade/core/camera.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/time.hpp"
+#include "pade/io/recording/flight/flight_names.hpp"
+#include "pade/io/recording/messages/messages.hpp"
 #include "pade/live/interfaces.hpp"
 #include "pade/live/sectors.hpp"
 #include "pade/live/web/channels.hpp"
@@ -30,6 +32,19 @@ namespace pade::live {
 /// What Publisher asks for a few times a second, in the server's thread. `latency`, `latency_95`, `occupied`
 /// and `web` are filled in by others.
 using HealthQuestion = std::function<HealthInputs()>;
+
+/// How messages call times and frames.
+struct MessageTerms {
+  std::string world = io::flight_names::world_frame, body = io::flight_names::body_frame,
+              camera = io::flight_names::camera_frame;
+  std::function<Time(Time)> stamp{};  ///< of a time of ours; empty: the same
+  bool states_body = true;            ///< the transforms say where the body is in the world
+  bool states_camera = true;          ///< and how the camera sits on it
+
+  [[nodiscard]] io::MessageHeader header(Time time, const std::string& frame) const {
+    return {stamp ? stamp(time) : time, frame};
+  }
+};
 
 /// Takes results from the mapper's thread and makes messages in the server's.
 class Publisher : public Sink {
@@ -60,6 +75,8 @@ class Publisher : public Sink {
 
   /// Called after each change, by the thread that made it. To be set while nothing changes.
   void on_change(std::function<void()> wake);
+  /// Asked for each message that is made. To be set while nothing changes.
+  void call_things(std::function<MessageTerms()> terms) { terms_ = std::move(terms); }
   /// Whether anybody could take the images of a frame at once: those of others are not kept.
   void set_hungry(bool hungry) { hungry_ = hungry; }
 
@@ -101,7 +118,10 @@ class Publisher : public Sink {
   Camera camera_;
   Pose T_body_camera_;
   SectorOptions sector_options_;
+  [[nodiscard]] MessageTerms terms() const { return terms_ ? terms_() : MessageTerms{}; }
+
   HealthQuestion question_;
+  std::function<MessageTerms()> terms_;
   std::function<void()> wake_;
   std::atomic<bool> hungry_{false};
 

@@ -107,7 +107,7 @@ io::Diagnosis SessionHealth::of(const HealthInputs& inputs) {
   put("pose_jumps", fmt::format("{}", link.jumps));
   put("packets", fmt::format("{}", link.in.packets));
   put("packets_bad", fmt::format("{}", link.in.bad));
-  put("packets_lost", fmt::format("{}", link.in.gaps));
+  put("packets_lost", fmt::format("{}", link.in.lost));
   put("processor_cores",
       elapsed > 0 ? fmt::format("{:.2f}", (now.processor - then.processor) / elapsed) : std::string("none"));
   put("memory_peak_mb", fmt::format("{:.0f}", peak_megabytes()));

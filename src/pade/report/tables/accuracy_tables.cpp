@@ -81,6 +81,7 @@ std::string to_table(const DepthAccuracy& accuracy) {
   table += fmt::format("{} depth images with truth; errors in metres over the pixels with an estimate",
                        accuracy.frames);
   if (accuracy.max_depth > 0) table += fmt::format("; beyond {:g} m counts as no depth", accuracy.max_depth);
+  if (std::isnan(accuracy.max_depth)) table += "; the runs have different limits of depth";
   return table + "\n";
 }
 
@@ -109,7 +110,9 @@ Json json_of(const DepthAccuracy& accuracy) {
     for (const auto& [name, field] : kFigures) range[name] = finite_or_null(row->*field);
     ranges.push_back(std::move(range));
   }
-  return {{"frames", accuracy.frames}, {"max_depth_m", accuracy.max_depth}, {"ranges", std::move(ranges)}};
+  return {{"frames", accuracy.frames},
+          {"max_depth_m", finite_or_null(accuracy.max_depth)},
+          {"ranges", std::move(ranges)}};
 }
 
 std::string to_json(const DepthAccuracy& accuracy) { return json_of(accuracy).dump(2) + "\n"; }

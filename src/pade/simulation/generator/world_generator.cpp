@@ -1,17 +1,22 @@
 #include "pade/simulation/generator/world_generator.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
-#include "pade/io/atomic_output.hpp"
+#include "pade/io/text.hpp"
 #include "pade/simulation/generator/furniture.hpp"
 
 namespace pade::simulation {
 namespace {
 
+namespace fs = std::filesystem;
 using Eigen::Vector3d;
 constexpr double kPi = std::numbers::pi;
 
@@ -335,6 +340,16 @@ WorldFiles Generator::corridor() {
   return out_.finish();
 }
 
+/// In the name of a file and in a URI within XML: bytes that mean something there are written as others.
+std::string mesh_name(std::string_view world, std::string_view mesh) {
+  std::string name;
+  for (const char c : world) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' || c == '.';
+    name += plain ? std::string(1, c) : fmt::format("+{:02x}", static_cast<unsigned char>(c));
+  }
+  return fmt::format("{}_{}", name, mesh);
+}
+
 }  // namespace
 
 WorldFiles generate_world(WorldKind kind, std::uint64_t seed) {
@@ -354,19 +369,49 @@ WorldFiles generate_world(WorldKind kind, std::uint64_t seed) {
   return generator.corridor();
 }
 
-Status write_world(const WorldFiles& files, const std::filesystem::path& world_file) {
-  const std::filesystem::path folder = world_file.parent_path();
-  std::error_code failed;
-  if (!folder.empty()) std::filesystem::create_directories(folder, failed);
-  if (failed) return Error{fmt::format("{}: cannot be made: {}", folder.string(), failed.message())};
-  for (const auto& [name, content] : files.meshes) {
-    std::filesystem::create_directories(folder / "meshes", failed);
-    if (failed)
-      return Error{fmt::format("{}: cannot be made: {}", (folder / "meshes").string(), failed.message())};
-    if (const Status s = io::write_file(folder / "meshes" / name, content, io::Overwrite::replace); !s)
-      return s;
+WorldFiles with_own_meshes(const WorldFiles& files, const std::filesystem::path& world_file) {
+  const std::string name =
+      (world_file.extension() == ".sdf" ? world_file.stem() : world_file.filename()).string();
+  WorldFiles own;
+  for (const auto& [mesh, content] : files.meshes) own.meshes[mesh_name(name, mesh)] = content;
+  constexpr std::string_view kUri = "<uri>meshes/";  // as SdfBuilder::mesh() writes it
+  std::string_view rest = files.sdf;
+  for (std::size_t at = rest.find(kUri); at != std::string_view::npos; at = rest.find(kUri)) {
+    const std::size_t from = at + kUri.size();
+    const std::size_t to = std::min(rest.find('<', from), rest.size());
+    own.sdf += rest.substr(0, from);
+    own.sdf += mesh_name(name, rest.substr(from, to - from));
+    rest.remove_prefix(to);
   }
-  return io::write_file(world_file, files.sdf, io::Overwrite::replace);
+  own.sdf += rest;
+  return own;
+}
+
+Status write_world(const WorldFiles& files, const fs::path& world_file, io::Overwrite overwrite) {
+  const fs::path folder = world_file.parent_path();
+  std::vector<std::pair<fs::path, const std::string*>> all;
+  for (const auto& [name, content] : files.meshes) all.emplace_back(folder / "meshes" / name, &content);
+  all.emplace_back(world_file, &files.sdf);
+  if (overwrite == io::Overwrite::refuse) {
+    for (const auto& [file, content] : all) {
+      std::error_code failed;
+      if (!fs::is_regular_file(file, failed)) continue;
+      const auto old = io::read_file(file);
+      if (old && *old == *content) continue;
+      return Error{
+          fmt::format("{}: the file exists with another content; choose another name for the world "
+                      "or replace it with --force",
+                      file.string())};
+    }
+  }
+  for (const auto& [file, content] : all) {
+    std::error_code failed;
+    if (file.has_parent_path()) fs::create_directories(file.parent_path(), failed);
+    if (failed)
+      return Error{fmt::format("{}: cannot be made: {}", file.parent_path().string(), failed.message())};
+    if (const Status s = io::write_file(file, *content, io::Overwrite::replace); !s) return s;
+  }
+  return {};
 }
 
 }  // namespace pade::simulation

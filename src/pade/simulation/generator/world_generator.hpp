@@ -9,6 +9,7 @@
 
 #include "pade/core/options.hpp"
 #include "pade/core/result.hpp"
+#include "pade/io/atomic_output.hpp"
 #include "pade/simulation/generator/sdf_builder.hpp"
 
 namespace pade::simulation {
@@ -26,8 +27,14 @@ enum class WorldKind { building, street, forest, rubble, corridor };
 /// - corridor: 4.4 m wide and 3.3 m high along x, windows on the left; free within 0.75 m of the centre line
 WorldFiles generate_world(WorldKind kind, std::uint64_t seed);
 
-/// Writes the world file and its meshes (into meshes/ beside it). Existing files are replaced.
-Status write_world(const WorldFiles& files, const std::filesystem::path& world_file);
+/// The same world with meshes of other names, which begin with that of `world_file`: worlds of other files in
+/// one folder keep their own.
+WorldFiles with_own_meshes(const WorldFiles& files, const std::filesystem::path& world_file);
+
+/// Writes the world file and its meshes (into meshes/ beside it). Existing files are replaced, or with
+/// Overwrite::refuse nothing is written where one of them exists with another content.
+Status write_world(const WorldFiles& files, const std::filesystem::path& world_file,
+                   io::Overwrite overwrite = io::Overwrite::replace);
 
 }  // namespace pade::simulation
 

@@ -1,16 +1,14 @@
 #include "pade/io/recording/flight/recorded_images.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <optional>
 #include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
+#include "pade/io/recording/messages/pixel_encoding.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
@@ -19,84 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kHeadBytes = 4096;  // enough for every field of an image before its pixels
-constexpr int kAsItIs = -1;
-
-/// An encoding of sensor_msgs/Image.
-struct PixelEncoding {
-  std::string_view name;
-  int type;        ///< of the bytes, as OpenCV has them
-  int conversion;  ///< to grey or BGR
-};
-
-const PixelEncoding* pixel_encoding(std::string_view name) {
-  // OpenCV names a Bayer pattern by its second row.
-  static constexpr std::array<PixelEncoding, 16> kKnown = {{
-      {"mono8", CV_8UC1, kAsItIs},
-      {"8UC1", CV_8UC1, kAsItIs},
-      {"mono16", CV_16UC1, kAsItIs},
-      {"bgr8", CV_8UC3, kAsItIs},
-      {"8UC3", CV_8UC3, kAsItIs},
-      {"rgb8", CV_8UC3, cv::COLOR_RGB2BGR},
-      {"bgr16", CV_16UC3, kAsItIs},
-      {"rgb16", CV_16UC3, cv::COLOR_RGB2BGR},
-      {"bgra8", CV_8UC4, cv::COLOR_BGRA2BGR},
-      {"rgba8", CV_8UC4, cv::COLOR_RGBA2BGR},
-      {"bayer_rggb8", CV_8UC1, cv::COLOR_BayerBG2BGR},
-      {"bayer_bggr8", CV_8UC1, cv::COLOR_BayerRG2BGR},
-      {"bayer_gbrg8", CV_8UC1, cv::COLOR_BayerGR2BGR},
-      {"bayer_grbg8", CV_8UC1, cv::COLOR_BayerGB2BGR},
-      {"yuv422", CV_8UC2, cv::COLOR_YUV2BGR_UYVY},
-      {"yuv422_yuy2", CV_8UC2, cv::COLOR_YUV2BGR_YUY2},
-  }};
-  const auto* const found = std::find_if(kKnown.begin(), kKnown.end(),
-                                         [&](const PixelEncoding& known) { return known.name == name; });
-  return found == kKnown.end() ? nullptr : found;
-}
-
-Result<ImageInfo> info_of(const ImageMessage& image) {
-  const PixelEncoding* const encoding = pixel_encoding(image.encoding);
-  if (encoding == nullptr) {
-    return Error{
-        fmt::format("found the encoding {}, expected mono8, mono16, rgb8, bgr8, rgba8, bgra8, rgb16, bgr16, "
-                    "yuv422 or bayer_*8",
-                    in_quotes(image.encoding))};
-  }
-  constexpr std::uint32_t kLongest = 1U << 20;
-  if (image.width == 0 || image.height == 0 || image.width > kLongest || image.height > kLongest)
-    return Error{fmt::format("the image states {} x {} pixels", image.width, image.height)};
-  const bool grey = CV_MAT_CN(encoding->type) == 1 && encoding->conversion == kAsItIs;
-  return ImageInfo{{static_cast<int>(image.width), static_cast<int>(image.height)},
-                   CV_MAT_DEPTH(encoding->type) == CV_16U ? 16 : 8,
-                   grey ? 1 : 3};
-}
 
 bool is_compressed(const Topic& topic) { return topic.type == "sensor_msgs/CompressedImage"; }
-
-/// Of the pixels in a CompressedImage, as image_transport writes it: "bayer_rggb8; jpeg compressed " for what
-/// was sent, or "bayer_rggb8; jpeg compressed bgr8", where it was converted before.
-std::string_view encoding_inside(std::string_view format) {
-  constexpr std::string_view kKey = "compressed ";
-  const std::size_t semicolon = format.find(';');
-  if (semicolon == std::string_view::npos) return {};
-  if (const std::size_t at = format.find(kKey, semicolon); at != std::string_view::npos) {
-    const std::string_view inside = format.substr(at + kKey.size());
-    const std::string_view word = inside.substr(0, inside.find(' '));
-    if (!word.empty()) return word;
-  }
-  return format.substr(0, semicolon);
-}
-
-/// Pixels as they were sent, in grey or BGR.
-Result<cv::Mat> converted(const cv::Mat& sent, const PixelEncoding& encoding) {
-  if (encoding.conversion == kAsItIs) return sent.clone();
-  cv::Mat pixels;
-  try {  // OpenCV throws on sizes that a pattern cannot have
-    cv::cvtColor(sent, pixels, encoding.conversion);
-  } catch (const std::exception&) {
-    return Error{fmt::format("{} x {} pixels of {} cannot be decoded", sent.cols, sent.rows, encoding.name)};
-  }
-  return pixels;
-}
 
 /// Reads the images of one topic by the names that they were listed under.
 class RecordedStore : public ImageStore {
@@ -135,14 +57,7 @@ class RecordedStore : public ImageStore {
     if (compressed_) {
       const auto file = compressed(name);
       if (!file) return file.error();
-      const auto stored = read_image_bytes(file->bytes, name);
-      if (!stored || file->mosaic == nullptr) return stored;
-      if (stored->depth() != CV_8U)
-        return named(
-            name, Error{fmt::format("found {} bits of a Bayer mosaic, expected 8", 8 * stored->elemSize1())});
-      auto colours = converted(*stored, *file->mosaic);
-      if (!colours) return named(name, colours.error());
-      return colours;
+      return pixels_of_file(file->bytes, file->mosaic, name);
     }
     const auto bytes = recording_->read(places_.at(name));
     if (!bytes) return bytes.error();
@@ -183,14 +98,9 @@ class RecordedStore : public ImageStore {
     const auto message = read_compressed_image(*bytes, encoding_);
     if (!message) return named(name, message.error());
     Compressed file{std::string(message->data), nullptr};
-    const std::string_view pixels = encoding_inside(message->format);
-    if (!pixels.starts_with("bayer_")) return file;
-    const auto info = inspect_image_bytes(file.bytes, name);
-    if (!info) return info.error();
-    if (info->channels != 1) return file;
-    file.mosaic = pixel_encoding(pixels);
-    if (file.mosaic == nullptr)
-      return named(name, Error{fmt::format("found the encoding {}, expected bayer_*8", in_quotes(pixels))});
+    const auto mosaic = mosaic_in(message->format, message->data, name);
+    if (!mosaic) return mosaic.error();
+    file.mosaic = *mosaic;
     return file;
   }
 
@@ -201,30 +111,6 @@ class RecordedStore : public ImageStore {
 };
 
 }  // namespace
-
-Result<cv::Mat> pixels_of(const ImageMessage& image) {
-  const auto info = info_of(image);
-  if (!info) return info.error();
-  const PixelEncoding& encoding = *pixel_encoding(image.encoding);
-  const std::size_t row = image.width * CV_ELEM_SIZE(encoding.type);
-  if (image.step < row || image.data.size() / image.step < image.height) {
-    return Error{fmt::format("the image has {} bytes in rows of {}, expected {} rows of {} at least",
-                             image.data.size(), image.step, image.height, row)};
-  }
-  const cv::Mat view(info->size, encoding.type, const_cast<char*>(image.data.data()),
-                     image.step);  // NOLINT: only read
-  auto sent = converted(view, encoding);
-  if (!sent) return sent.error();
-  cv::Mat pixels = std::move(*sent);
-  if (info->bits == 16 && image.big_endian != (std::endian::native == std::endian::big)) {
-    for (int y = 0; y < pixels.rows; ++y) {
-      auto* const values = pixels.ptr<std::uint16_t>(y);
-      for (int i = 0; i < pixels.cols * pixels.channels(); ++i)
-        values[i] = static_cast<std::uint16_t>(values[i] << 8 | values[i] >> 8);
-    }
-  }
-  return pixels;
-}
 
 bool is_camera_topic(const Recording& recording, const Topic& topic) {
   const auto encoding = message_encoding(topic.encoding);
@@ -257,7 +143,9 @@ Result<std::vector<std::optional<Time>>> stamps_of(const Recording& recording, c
     if (!bytes) return bytes.error();
     const auto header = read_header(*bytes, *encoding);
     stamps.emplace_back();
-    if (header && header->stamp.nanoseconds != 0) {
+    // 0 is a time where the recording begins at 0, as simulated flights do; or, in a bag, at the first time
+    // that is one there.
+    if (header && (header->stamp.nanoseconds != 0 || place.time.nanoseconds <= 1)) {
       stamps.back() = header->stamp;
     } else {
       ++silent;

@@ -33,10 +33,6 @@ Result<RecordedImages> recorded_images(std::shared_ptr<const Recording> recordin
 /// Whether the pixels are those of a camera, and not depths or labels: by the first message.
 bool is_camera_topic(const Recording& recording, const Topic& topic);
 
-/// The pixels of a message: 8 or 16 bit, grey or BGR. Error for an encoding that is not understood, or fewer
-/// bytes than its rows need.
-Result<cv::Mat> pixels_of(const ImageMessage& image);
-
 /// When the messages of a topic were made: by their headers. Where most headers say nothing, when they were
 /// recorded; where a few do, those are empty and to be left out: both with a note. Errors: the topic is
 /// written in a way that is not understood.

@@ -89,6 +89,18 @@ std::string write_cubes(const MessageHeader& header, std::span<const CubeMarker>
   return out.take();
 }
 
+std::string write_octomap(const MessageHeader& header, std::string_view file, double voxel, bool binary) {
+  constexpr std::string_view kData = "\ndata\n";
+  const std::size_t at = file.find(kData);
+  MessageWriter out(MessageEncoding::cdr);
+  out.header(header);
+  out.number(static_cast<std::uint8_t>(binary ? 1 : 0));
+  out.text("OcTree");
+  out.number(voxel);
+  out.bytes(at == std::string_view::npos ? std::string_view() : file.substr(at + kData.size()));
+  return out.take();
+}
+
 std::string write_path(const MessageHeader& header, std::span<const PathPose> poses) {
   MessageWriter out(MessageEncoding::cdr);
   out.header(header);

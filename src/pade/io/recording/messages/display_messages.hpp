@@ -41,6 +41,11 @@ struct CubeMarker {
 /// visualization_msgs/MarkerArray of lists of cubes, in the namespace "occupied".
 std::string write_cubes(const MessageHeader& header, std::span<const CubeMarker> markers);
 
+/// octomap_msgs/Octomap of a map file (map_files.hpp): what stands behind its header.
+/// @param file     content of a .bt (`binary`) or .ot
+/// @param voxel    side, m
+std::string write_octomap(const MessageHeader& header, std::string_view file, double voxel, bool binary);
+
 /// A pose at a time.
 struct PathPose {
   Time time;

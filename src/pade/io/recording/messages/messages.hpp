@@ -13,6 +13,7 @@
 #include "pade/core/result.hpp"
 #include "pade/core/time.hpp"
 #include "pade/io/recording/byte_reader.hpp"
+#include "pade/io/recording/messages/image_messages.hpp"
 
 namespace pade::io {
 
@@ -57,37 +58,6 @@ class MessageReader {
   MessageEncoding encoding_;
 };
 
-/// std_msgs/Header.
-struct MessageHeader {
-  Time stamp;
-  std::string frame;
-};
-/// sensor_msgs/Image.
-struct ImageMessage {
-  MessageHeader header;
-  std::uint32_t height = 0, width = 0;
-  std::string encoding;
-  bool big_endian = false;
-  std::uint32_t step = 0;  ///< bytes of a row
-  std::string_view data;   ///< in the bytes that were read
-};
-/// sensor_msgs/CompressedImage.
-struct CompressedImageMessage {
-  MessageHeader header;
-  std::string format;
-  std::string_view data;  ///< in the bytes that were read
-};
-/// sensor_msgs/CameraInfo.
-struct CameraInfoMessage {
-  MessageHeader header;
-  std::uint32_t height = 0, width = 0;
-  std::string model;
-  std::vector<double> d;
-  std::array<double, 9> k{}, r{};
-  std::array<double, 12> p{};
-  std::uint32_t binning_x = 0, binning_y = 0;
-  std::uint32_t x_offset = 0, y_offset = 0;  ///< of the region of interest
-};
 /// sensor_msgs/Imu.
 struct ImuMessage {
   MessageHeader header;

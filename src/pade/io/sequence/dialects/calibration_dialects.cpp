@@ -176,6 +176,11 @@ Result<Calibration> finish(Fields& fields, Calibration&& calibration) {
   return std::move(calibration);
 }
 
+Error one_camera_only(const std::string& file, int camera) {
+  return Error{fmt::format("{}: found no camera number {} (--camera, from 0), expected one that it holds",
+                           file, camera)};
+}
+
 bool is_kalibr(const Yaml& root) {
   return std::any_of(root.map.begin(), root.map.end(), [](const Yaml::Entry& entry) {
     const std::string& key = entry.key;
@@ -278,6 +283,7 @@ Result<Calibration> read_opencv(const Yaml& root, const std::string& file, int i
   camera.width = fields.pixels({fields.spelled({"image_width", "width"})}, kSize).value_or(0);
   camera.height = fields.pixels({fields.spelled({"image_height", "height"})}, kSize).value_or(0);
   const bool pair = has(root, {matrix_of_pair, other_of_pair});
+  if (!pair && index > 0) return one_camera_only(file, index);
   read_matrix(fields, camera,
               pair ? fields.spelled({matrix_of_pair, other_of_pair})
                    : fields.spelled({"camera_matrix", "k", "mtx", "intrinsic_matrix"}));

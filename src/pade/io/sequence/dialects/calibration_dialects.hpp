@@ -13,6 +13,9 @@
 
 namespace pade::io::dialect {
 
+/// What a file that holds one camera says where another number is asked for.
+Error one_camera_only(const std::string& file, int camera);
+
 /// A camchain: cam0, cam1 ... `camera` chooses; T_cam_imu or T_imu_cam of the camera itself, or of an earlier
 /// one through T_cn_cnm1.
 bool is_kalibr(const Yaml& root);

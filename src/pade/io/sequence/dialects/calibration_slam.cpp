@@ -135,6 +135,7 @@ Result<Calibration> read_orb_slam(const Yaml& root, const std::string& file, int
   out.format = "ORB-SLAM";
   Camera camera;
   const bool numbered = root.find("Camera1.fx") != nullptr;
+  if (!numbered && index > 0) return one_camera_only(file, index);
   const std::string prefix = numbered ? fmt::format("Camera{}.", index + 1) : "Camera.";
   camera.width = fields.pixels({"Camera.width"}, kSize).value_or(0);
   camera.height = fields.pixels({"Camera.height"}, kSize).value_or(0);

@@ -87,7 +87,8 @@ Result<SequenceListing> read_icl_nuim_layout(const fs::path& folder, const Layou
   if (!calibration) return calibration.error();
   listing.calibration = std::move(*calibration);
   listing.images = numbered_frames(image_files(folder / "rgb"), report);
-  listing.depth = numbered_frames(image_files(folder / "depth"), report);
+  listing.depth_folder = folder / "depth";
+  listing.depth = numbered_frames(image_files(listing.depth_folder), report);
   if (choice.computed) return listing;
   if (choice.poses == "original") {
     return Error{

@@ -11,23 +11,12 @@
 #include "pade/io/recording/flight/recorded_images.hpp"
 #include "pade/io/recording/flight/topic_choice.hpp"
 #include "pade/io/recording/messages/messages.hpp"
-#include "pade/io/sequence/calibration_fields.hpp"
 #include "pade/io/sequence/dialects/pose_dialects.hpp"
 #include "pade/io/sequence/layouts/sequence_layout.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
 namespace {
-
-/// Whether a topic is that of rectified images: "/left/image_rect_color", and not "/direct/image_corrected".
-bool is_rectified(std::string_view name) {
-  while (!name.empty()) {
-    const std::size_t end = std::min(name.find_first_of("/_"), name.size());
-    if (name.substr(0, end) == "rect" || name.substr(0, end) == "rectified") return true;
-    name.remove_prefix(std::min(end + 1, name.size()));
-  }
-  return false;
-}
 
 constexpr double kLargestGap = 0.5;  // between rows of a transform that others are composed with, s
 
@@ -166,42 +155,10 @@ class RecordingLayout {
     if (is_rectified(image_topic_->name))
       report_.notes.push_back(fmt::format("{}: taken as rectified by its name: P of {} is the camera",
                                           image_topic_->name, topic.name));
-    auto camera = camera_of(*first);
+    auto camera = camera_of(*first, is_rectified(image_topic_->name));
     if (!camera) return error(fmt::format("{}: {}", topic.name, camera.error().message));
     calibration.camera = *camera;
     return {};
-  }
-
-  Result<Camera> camera_of(const CameraInfoMessage& info) const {
-    if (info.binning_x > 1 || info.binning_y > 1 || info.x_offset > 0 || info.y_offset > 0)
-      return Error{"the images are binned or cut, expected the calibration of the images as they are"};
-    Camera camera;
-    camera.width = static_cast<int>(std::min<std::uint32_t>(info.width, 1U << 20));
-    camera.height = static_cast<int>(std::min<std::uint32_t>(info.height, 1U << 20));
-    const bool rectified = is_rectified(image_topic_->name);
-    constexpr std::array<double, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    if (rectified && info.r != kIdentity) {
-      return Error{
-          "the rectified images are turned against the camera (R is not 1), which is not understood: take "
-          "those that "
-          "are not rectified"};
-    }
-    const auto& p = info.p;
-    camera.fx = rectified ? p[0] : info.k[0];
-    camera.cx = rectified ? p[2] : info.k[2];
-    camera.fy = rectified ? p[5] : info.k[4];
-    camera.cy = rectified ? p[6] : info.k[5];
-    if (!(camera.fx > 0) || !(camera.fy > 0) ||
-        !std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy)) {
-      return Error{
-          fmt::format("found the focal lengths {} and {}, expected positive numbers: the camera was never "
-                      "calibrated",
-                      camera.fx, camera.fy)};
-    }
-    if (!rectified && std::abs(info.k[1]) > 1e-6 * camera.fx) return Error{"found a skew, expected none"};
-    if (rectified || info.d.empty()) return camera;
-    if (const auto problem = set_distortion(camera, info.model, info.d)) return Error{*problem};
-    return camera;
   }
 
   /// How the camera sits on the IMU, if there is one and transforms tell it.

@@ -35,7 +35,31 @@ void override_with(Calibration& base, const Calibration& other) {
   replace(base.origin, other.origin);
 }
 
+using LayoutReader = Result<SequenceListing> (*)(const fs::path&, const LayoutChoice&, ReadReport&);
+
+/// Of the layout that a folder has; none if it has none that is known.
+LayoutReader reader_of(const fs::path& folder) {
+  if (path_exists(folder / "mav0" / "cam0") || path_exists(folder / "cam0" / "data.csv"))
+    return read_euroc_layout;
+  if (is_tartanair_layout(folder)) return read_tartanair_layout;
+  if (is_icl_nuim_layout(folder)) return read_icl_nuim_layout;
+  for (const char* name : {"image_0", "image_1", "image_2", "image_3"})
+    if (path_exists(folder / name)) return read_kitti_layout;
+  for (const char* name : {"rgb", "rgb.txt", "associations.txt", "images", "images.txt", "image", "color",
+                           "colour", "image_left"}) {
+    if (path_exists(folder / name)) return read_tum_layout;
+  }
+  return nullptr;
+}
+
 }  // namespace
+
+bool looks_like_a_sequence(const fs::path& folder) {
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure)) return false;
+  return is_recording(folder) || reader_of(folder) != nullptr ||
+         (path_exists(folder / "camera.yaml") && path_exists(folder / "groundtruth.txt"));
+}
 
 std::vector<fs::path> image_files(const fs::path& folder) {
   static constexpr std::array<std::string_view, 10> kExtensions = {".png", ".jpg", ".jpeg", ".pgm",  ".ppm",
@@ -55,6 +79,14 @@ std::vector<fs::path> image_files(const fs::path& folder) {
   return files;
 }
 
+std::size_t files_in(const fs::path& folder) {
+  std::size_t count = 0;
+  std::error_code failure;
+  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end; entry.increment(failure))
+    count += entry->path().filename().string().starts_with(".") ? 0 : 1;
+  return count;
+}
+
 Result<Calibration> with_overrides(Calibration base, const fs::path& folder, const LayoutChoice& choice,
                                    ReadReport& report) {
   for (const std::string& field : base.unknown_fields) {
@@ -63,9 +95,16 @@ Result<Calibration> with_overrides(Calibration base, const fs::path& folder, con
   std::vector<fs::path> files;
   if (path_exists(folder / "camera.yaml")) files.push_back(folder / "camera.yaml");
   if (!choice.calibration_file.empty()) files.push_back(choice.calibration_file);
+  if (files.empty() && choice.camera > 0) {
+    return Error{fmt::format(
+        "{}: found no calibration file that holds several cameras in it, expected one since camera {} is "
+        "asked for (--camera, --calibration)",
+        folder.string(), choice.camera)};
+  }
   for (const fs::path& file : files) {
     const bool asked_for = !choice.calibration_file.empty() && file == files.back();
-    const auto read = read_calibration(file, asked_for ? choice.camera : 0);
+    // The number is that of a camera in the file that has the last word.
+    const auto read = read_calibration(file, file == files.back() ? choice.camera : 0);
     if (!read) return read.error();
     if (asked_for && !read->camera && !(choice.mounting_alone && read->T_body_camera)) {
       return Error{
@@ -93,18 +132,7 @@ Result<SequenceListing> read_layout(const fs::path& folder, const LayoutChoice& 
     return Error{fmt::format("{}: is a file, expected the folder of a sequence or a recording of ROS{}",
                              folder.string(), advice_for(folder))};
   }
-  if (path_exists(folder / "mav0" / "cam0") || path_exists(folder / "cam0" / "data.csv")) {
-    return read_euroc_layout(folder, choice, report);
-  }
-  if (is_tartanair_layout(folder)) return read_tartanair_layout(folder, choice, report);
-  if (is_icl_nuim_layout(folder)) return read_icl_nuim_layout(folder, choice, report);
-  for (const char* name : {"image_0", "image_1", "image_2", "image_3"}) {
-    if (path_exists(folder / name)) return read_kitti_layout(folder, choice, report);
-  }
-  for (const char* name : {"rgb", "rgb.txt", "associations.txt", "images", "images.txt", "image", "color",
-                           "colour", "image_left"}) {
-    if (path_exists(folder / name)) return read_tum_layout(folder, choice, report);
-  }
+  if (const LayoutReader read = reader_of(folder)) return read(folder, choice, report);
   if (const auto why = why_no_recording(folder)) return Error{folder.string() + ": " + *why};
   return Error{fmt::format(
       "{}: no known layout, expected rgb/ or images/ (TUM RGB-D, ICL-NUIM), mav0/cam0/ (EuRoC), image_0/ or "

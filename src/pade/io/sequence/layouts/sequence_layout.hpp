@@ -28,7 +28,8 @@ struct SequenceListing {
   std::string layout;                                                        ///< as Sequence::layout
   std::shared_ptr<const ImageStore> store = std::make_shared<ImageStore>();  ///< reads `images`
   std::vector<StampedFile> images;
-  std::vector<StampedFile> depth;  ///< truth, may be empty
+  std::vector<StampedFile> depth;      ///< truth, may be empty
+  std::filesystem::path depth_folder;  ///< where the layout has it; need not be there
   std::filesystem::path pose_file;
   Trajectory trajectory;                 ///< T_world_camera or T_world_body
   bool poses_of_body = false;            ///< T_body_camera of `calibration` is to be applied
@@ -72,12 +73,19 @@ Result<SequenceListing> read_icl_nuim_layout(const std::filesystem::path& folder
 Result<SequenceListing> read_recording_layout(const std::filesystem::path& file, const LayoutChoice& choice,
                                               ReadReport& report);
 
+/// Whether a folder is laid out as a sequence, or has the calibration and the poses of one; it may still be
+/// broken.
+bool looks_like_a_sequence(const std::filesystem::path& folder);
+
 /// Recognises the layout and reads it.
 Result<SequenceListing> read_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
                                     ReadReport& report);
 
 /// Image files directly inside `folder`, sorted by name; empty if there is no such folder.
 std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder);
+
+/// How many entries `folder` has, hidden ones left out; 0 if there is no such folder.
+std::size_t files_in(const std::filesystem::path& folder);
 
 /// `base`, the layout's own calibration, with what camera.yaml in `folder` and then the calibration file of
 /// the options say instead. That file must describe a camera: it was asked for.

@@ -113,7 +113,8 @@ Result<SequenceListing> read_tartanair_layout(const fs::path& folder, const Layo
   if (!calibration) return calibration.error();
   listing.calibration = std::move(*calibration);
   listing.images = numbered(image_files(images_of(folder, side)), report);
-  listing.depth = numbered(depth_files(folder / fmt::format("depth_{}", side.name)), report);
+  listing.depth_folder = folder / fmt::format("depth_{}", side.name);
+  listing.depth = numbered(depth_files(listing.depth_folder), report);
   report.notes.emplace_back("the layout states no times: the frames are taken as 0.1 s apart");
   if (choice.computed) return listing;
   if (choice.poses == "original") {

@@ -181,6 +181,7 @@ Result<SequenceListing> read_tum_layout(const fs::path& folder, const LayoutChoi
         (folder / name).string(), name)};
   }
   listing.images = std::move(*images);
+  listing.depth_folder = folder / "depth";
   const bool listed = path_exists(folder / "associations.txt");
   if (path_exists(folder / "depth") || path_exists(folder / "depth.txt") || listed) {
     auto depth = list_images(folder, "depth", true, report);

@@ -1,0 +1,12 @@
+// In place of network.cpp where CycloneDDS is missing.
+#include "pade/live/dds/network.hpp"
+
+namespace pade::live {
+
+Result<std::unique_ptr<DdsNetwork>> DdsNetwork::open(const DdsOptions& /*options*/) {
+  return Error{
+      "dds: this program was built without CycloneDDS: install cyclonedds-dev, and build it again with "
+      "-DPADE_DDS=ON"};
+}
+
+}  // namespace pade::live
