@@ -4,9 +4,7 @@
 namespace pade::live {
 
 Result<std::unique_ptr<DdsNetwork>> DdsNetwork::open(const DdsOptions& /*options*/) {
-  return Error{
-      "dds: this program was built without CycloneDDS: install cyclonedds-dev, and build it again with "
-      "-DPADE_DDS=ON"};
+  return Error{"dds: this program was built without CycloneDDS: install cyclonedds-dev and build it again"};
 }
 
 }  // namespace pade::live
