@@ -96,6 +96,7 @@ class Running : public Bridge {
   std::vector<Diagnosis> diagnose() override;
 
  private:
+  void do_between_frames(const std::function<void()>& errand);
   template <class Message>
   void pass_on(const Message& message) {
     poses_->add(message);
@@ -559,14 +560,15 @@ void Running::run_maps() {
   }
 }
 
-void Running::reset() {
+/// Has the mapper's thread do something between two frames, and waits until it is done.
+void Running::do_between_frames(const std::function<void()>& errand) {
   std::mutex done_mutex;
   std::condition_variable done_come;
   bool done = false;
   {
     const std::lock_guard lock(mutex_);
     errands_.emplace_back([&] {
-      begin_anew("asked for by reset");
+      errand();
       const std::lock_guard done_lock(done_mutex);
       done = true;
       done_come.notify_all();
@@ -577,6 +579,10 @@ void Running::reset() {
   done_come.wait(lock, [&] { return done; });
 }
 
+void Running::reset() {
+  do_between_frames([&] { begin_anew("asked for by reset"); });
+}
+
 bool Running::save_map(const std::string& file, std::string& message) {
   namespace fs = std::filesystem;
   const fs::path wanted = file.empty() ? fs::path(options_.map_file) : fs::path(file);
@@ -585,28 +591,13 @@ bool Running::save_map(const std::string& file, std::string& message) {
     message = fmt::format("{}: the name of a map file must end in .bt or .ot", wanted.string());
     return false;
   }
-  std::mutex done_mutex;
-  std::condition_variable done_come;
-  bool done = false;
   std::string content, side_car;
-  {
-    const std::lock_guard lock(mutex_);
-    errands_.emplace_back([&] {
-      if (mapper_ && mapped_anew_ > 0) {
-        const auto format = extension == ".bt" ? pade::io::MapFormat::bt : pade::io::MapFormat::ot;
-        content = pade::io::bytes_of(pade::io::encode_map(mapper_->map(), format));
-        side_car = pade::io::encode_side_car(options_.mapper.map, std::nullopt);
-      }
-      const std::lock_guard done_lock(done_mutex);
-      done = true;
-      done_come.notify_all();
-    });
-  }
-  come_.notify_all();
-  {
-    std::unique_lock lock(done_mutex);
-    done_come.wait(lock, [&] { return done; });
-  }
+  do_between_frames([&] {
+    if (!mapper_ || mapped_anew_ == 0) return;
+    const auto format = extension == ".bt" ? pade::io::MapFormat::bt : pade::io::MapFormat::ot;
+    content = pade::io::bytes_of(pade::io::encode_map(mapper_->map(), format));
+    side_car = pade::io::encode_side_car(options_.mapper.map, std::nullopt);
+  });
   if (content.empty()) {
     message = "nothing is mapped yet: no file was written";
     return false;

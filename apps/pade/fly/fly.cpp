@@ -95,6 +95,8 @@ Result<FlightPlace> place_of(const FlyArguments& arguments) {
   FlightPlace place;
   if (arguments.density) place.density = *arguments.density;
   place.way = arguments.way;
+  if (place.way && !std::isfinite(*place.way))
+    return Error{fmt::format("--way: found {}, expected 5 to 60 m", *place.way)};
   if (arguments.world.empty() == arguments.random.empty())
     return Error{"found both or neither of WORLD and --random, expected one of them"};
   if (!arguments.random.empty()) {
