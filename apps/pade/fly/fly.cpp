@@ -15,6 +15,7 @@
 #include "../commands.hpp"
 
 #ifdef PADE_HAS_SIMULATION
+#include "pade/core/option_check.hpp"
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
@@ -192,6 +193,7 @@ Result<FleetOptions> fleet_options(const FlyArguments& arguments) {
                     arguments.depth)};
   if (const Status s = check_use(arguments, options.flier); !s) return s.error();
   options.exact.planner = options.chain.planner;
+  if (const Status s = within("planner", planning::check(options.exact.planner)); !s) return s.error();
   if (arguments.width) options.exact.width = *arguments.width;
   return options;
 }
