@@ -20,6 +20,7 @@ packages_test=(libgtest-dev libgmock-dev)
 packages_lint=(clang-format clang-tidy)
 packages_docs=(doxygen)
 packages_dds=(cyclonedds-dev libfastrtps-dev)  # topics of ROS 2 and the peer that they are tested with: for scripts/dds alone
+packages_video=(libavformat-dev libavcodec-dev libswscale-dev ffmpeg)  # videos as cameras, and who makes them: for scripts/video-oracle
 packages_python=(pybind11-dev python3-dev python3-numpy python3-build python3-venv mypy)  # for scripts/python alone
 
 assume_yes=false
