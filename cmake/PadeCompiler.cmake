@@ -12,6 +12,8 @@ add_compile_options(-ffp-contract=off)
 if(PADE_SANITIZE)
   add_compile_options(-fsanitize=${PADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${PADE_SANITIZE})
+  # Their dlopen is not the program's, so that only the older kind of run path counts for it.
+  add_link_options(-Wl,--disable-new-dtags)
   # What the sanitizers add hides from g++ that standard containers are initialised (seen in std::regex).
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     add_compile_options(-Wno-maybe-uninitialized)

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/recording/messages/message_definitions.hpp"
 #include "pade/live/web/pictures.hpp"
 #include "pade/live/web/thinned_path.hpp"
@@ -94,7 +94,7 @@ TEST(WebMessages, SayWhatTheMapperSaid) {
   EXPECT_EQ(info["k"].list[0].number, 60);
   for (const WebChannel channel : {WebChannel::camera, WebChannel::obstacles, WebChannel::depth_picture}) {
     const std::string file = client.next(bed.publisher, channel)["data"].text;
-    const cv::Mat picture = cv::imdecode(std::vector<char>(file.begin(), file.end()), cv::IMREAD_COLOR);
+    const cv::Mat picture = *io::decode_image(io::image_bytes(file), io::Pixels::colour);
     EXPECT_EQ(picture.size(), cv::Size(96, 64)) << static_cast<int>(channel);
   }
 }

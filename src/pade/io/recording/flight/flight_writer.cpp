@@ -8,9 +8,9 @@
 
 #include <GeographicLib/LocalCartesian.hpp>
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/core/version.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/navigation/geodetic_fixes.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/recording/messages/message_writer.hpp"
@@ -372,8 +372,8 @@ Status write_mask(const Sequence& sequence, const OutputFolder& folder, WrittenF
     written.left_out.emplace_back("the mask, which is of the undistorted images");
     return {};
   }
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", sequence.mask(), bytes)) return Error{"mask.png: cannot be written as PNG"};
+  const auto bytes = encode_png(sequence.mask());
+  if (bytes.empty()) return Error{"mask.png: cannot be written as PNG"};
   return folder.write("mask.png", std::span<const unsigned char>(bytes));
 }
 
