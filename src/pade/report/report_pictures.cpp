@@ -62,18 +62,6 @@ const Table& table_of(Palette palette) {
 
 constexpr std::string_view kBase64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-std::string base64(const std::vector<unsigned char>& bytes) {
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0U);
-    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kBase64[group >> (18 - 6 * k) & 63U] : '=';
-  }
-  return text;
-}
-
 std::string data_uri(const cv::Mat& picture, int largest_width, int interpolation, std::string_view type,
                      const std::vector<int>& parameters) {
   cv::Mat fitted = picture;
@@ -101,6 +89,18 @@ cv::Mat colourise_classes(const cv::Mat& states, const std::array<std::string_vi
 }
 
 }  // namespace
+
+std::string base64(const std::vector<unsigned char>& bytes) {
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0U);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kBase64[group >> (18 - 6 * k) & 63U] : '=';
+  }
+  return text;
+}
 
 cv::Mat colourise(const cv::Mat& values, double from, double to, Palette palette) {
   const Table& table = table_of(palette);
