@@ -202,9 +202,11 @@ function showAge () {
   element('ring').classList.toggle('old', silent('/pade/sectors'))
   const lost = silent('/diagnostics')
   element('health').classList.toggle('old', lost)
+  const image = last['/pade/obstacles/compressed']
+  const stalled = !lost && image && now - image > kStale && !pade.health.message.startsWith('no image') // known here before the health says so
   const state = element('state')
-  state.textContent = lost ? 'no connection to pade live' : pade.health.message
-  state.classList.toggle('well', !lost && pade.health.level === 0)
+  state.textContent = lost ? 'no connection to pade live' : stalled ? `no image for ${((now - image) / 1000).toFixed(1)} s` : pade.health.message
+  state.classList.toggle('well', !lost && !stalled && pade.health.level === 0)
 }
 
 function connect () {
