@@ -112,6 +112,25 @@ PADE_INLINE void gather_pairs(const float* base, I index, V& first, V& second) {
 #endif
 }
 
+// Whether pick() is one instruction.
+#if defined(__AVX2__)
+inline constexpr bool kPicks = true;
+#else
+inline constexpr bool kPicks = false;
+#endif
+// Lane i of the result is lane `lane[i]` of `values`; of `lane` only the bits that number lanes count.
+PADE_INLINE V pick(V values, I lane) {
+#if defined(__AVX512F__)
+  return V(_mm512_maskz_permutexvar_ps(kAll, __m512i(lane), __m512(values)));
+#elif defined(__AVX2__)
+  return V(_mm256_permutevar8x32_ps(__m256(values), __m256i(lane)));
+#else
+  V out;
+  for (int i = 0; i < kLanes; ++i) out[i] = values[lane[i] & (kLanes - 1)];
+  return out;
+#endif
+}
+
 PADE_INLINE I truncate(V a) { return __builtin_convertvector(a, I); }
 PADE_INLINE V to_float(I a) { return __builtin_convertvector(a, V); }
 PADE_INLINE V abs(V a) { return V(I(a) & 0x7fffffff); }
