@@ -95,7 +95,8 @@ void bound_by_outlines(DepthImage& image) {
     const auto* bound = image.bound.ptr<float>(v);
     const auto* state = image.state.ptr<std::uint8_t>(v);
     for (int u = 0; u < width; ++u) {
-      const float rho = bound[u] > 0 ? 1 / bound[u] : kUnknown;
+      const float inverse = 1 / bound[u];  // in any case: so that the loop vectorises
+      const float rho = bound[u] > 0 ? inverse : kUnknown;
       own[static_cast<std::size_t>(u)] = state[u] == kBlank ? kOpen : rho;
     }
   };
