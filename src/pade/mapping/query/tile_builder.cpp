@@ -29,21 +29,35 @@ void Tile::summarise() {
 }
 
 void TileTree::index() {
-  constexpr std::size_t kMostGroups = 1U << 16U;
+  constexpr std::int64_t kMostGroups = 1U << 16U;
+  constexpr std::int64_t kMostTiles = 1U << 17U;
   constexpr int kTilesOfAGroup = 8;
   groups.clear();
+  near_tiles.clear();
   if (bounds.first[0] > bounds.last[0]) return;
-  std::size_t count = 1;
+  std::int64_t group_count = 1;
+  std::int64_t tile_count = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     first_group[axis] = bounds.first[axis] / kTilesOfAGroup;
     group_counts[axis] = bounds.last[axis] / kTilesOfAGroup - first_group[axis] + 1;
-    count *= static_cast<std::size_t>(group_counts[axis]);
+    group_count *= group_counts[axis];
+    near_counts[axis] = bounds.last[axis] - bounds.first[axis] + 1;
+    tile_count *= near_counts[axis];
   }
-  if (count > kMostGroups) return;
+  if (group_count > kMostGroups) return;
   for (int z = 0; z < group_counts[2]; ++z)
     for (int y = 0; y < group_counts[1]; ++y)
       for (int x = 0; x < group_counts[0]; ++x)
         groups.push_back(&group_by_nodes(first_group[0] + x, first_group[1] + y, first_group[2] + z));
+  // Rounded towards zero, a place below the first tile of all would be in it.
+  const bool is_at_border = *std::min_element(bounds.first.begin(), bounds.first.end()) == 0;
+  if (tile_count > kMostTiles || is_at_border) return;
+  near_first = bounds.first;
+  near_tiles.reserve(static_cast<std::size_t>(tile_count) + 1);
+  near_tiles.push_back(&tile(0, 0, 0));
+  for (int z = bounds.first[2]; z <= bounds.last[2]; ++z)
+    for (int y = bounds.first[1]; y <= bounds.last[1]; ++y)
+      for (int x = bounds.first[0]; x <= bounds.last[0]; ++x) near_tiles.push_back(&tile(x, y, z));
 }
 
 namespace {
