@@ -100,14 +100,15 @@ void add_eighth(std::uint64_t rows, std::size_t eighth, std::uint64_t Tile::Word
   }
 }
 
-std::shared_ptr<const Tile> make_tile(const VoxelTile& from, float per_step) {
+std::shared_ptr<const Tile> make_tile(const VoxelStore& voxels, const VoxelTile& from, float per_step) {
   auto tile = std::make_shared<Tile>();
   for (std::size_t eighth = 0; eighth < 8; ++eighth) {
     add_eighth(in_rows(from.known[eighth]), eighth, &Tile::Word::known, *tile);
     add_eighth(in_rows(from.occupied[eighth]), eighth, &Tile::Word::occupied, *tile);
+    const EighthValues values = voxels.values_of(from, eighth);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      tile->log_odds[64 * eighth + i] = quantised(values[i], per_step);
   }
-  for (std::size_t i = 0; i < from.log_odds.size(); ++i)
-    tile->log_odds[i] = quantised(from.log_odds[i], per_step);
   tile->summarise();
   return tile;
 }
@@ -178,7 +179,7 @@ class Builder {
       }
       if constexpr (std::is_same_v<Part, Tile>) {
         extend(place);
-        return make_tile(voxels_.tile(entry), per_step_);
+        return make_tile(voxels_, voxels_.tile(entry), per_step_);
       } else {
         return node_of<Part>(code, old, touched);
       }
