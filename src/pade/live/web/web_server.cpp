@@ -248,7 +248,8 @@ int WebServer::Work::refuse(lws* socket, const Refusal& refusal) {
   // It comes from the network, and goes into a page.
   std::string text = refusal.reason;
   std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '<' || c == '>' || c == '&' || c < ' '; }, '?');
+      text.begin(), text.end(), [](char c) { return c == '<' || c == '>' || c == '&' || c < ' ' || c > '~'; },
+      '?');
   (void)lws_return_http_status(socket, static_cast<unsigned>(refusal.code), text.c_str());
   return 1;
 }
