@@ -18,8 +18,6 @@
 #include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
-#include "pade/live/recordings/tlog.hpp"
-#include "pade/live/recordings/ulog.hpp"
 #include "pade/navigation/navigation_run.hpp"
 #include "pade/offline/checked_log.hpp"
 #include "pade/report/gnss/raw_gnss_report.hpp"
@@ -28,6 +26,7 @@
 #include "commands.hpp"
 #include "odometry.hpp"
 #include "options/json_text.hpp"
+#include "options/sensor_log.hpp"
 #include "options/unused_options.hpp"
 #include "raw_gnss.hpp"
 #include "tight.hpp"
@@ -202,23 +201,11 @@ nlohmann::ordered_json json_of(const navigation::RawTally& tally) {
           {"clock_jumps", tally.clock_jumps}};
 }
 
-/// A folder, or an autopilot's recording.
 Result<CheckedLog> read_log(const NavigateArguments& arguments) {
-  const bool px4 = live::is_ulog(arguments.log);
-  if (px4 || live::is_tlog(arguments.log)) {
-    if (!arguments.gnss.empty())
-      return Error{"--gnss: found a recording, which has one GNSS; expected a folder"};
-    if (!arguments.topics.empty())
-      return Error{
-          "--topics: found an autopilot's log, which has none to choose from; expected a recording of ROS"};
-    auto sensors = px4 ? live::read_ulog_sensors(arguments.log) : live::read_tlog_sensors(arguments.log);
-    if (!sensors) return sensors.error();
-    return checked_log(std::move(*sensors));
-  }
   io::NavigationLogOptions options;
   options.gnss = arguments.gnss;
   options.topics = arguments.topics;
-  return read_checked_log(arguments.log, options);
+  return read_sensor_log(arguments.log, options);
 }
 
 Status navigate(const NavigateArguments& arguments) {
