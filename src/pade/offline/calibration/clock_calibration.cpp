@@ -72,6 +72,21 @@ Result<SeenTurns> turns_of(const io::Sequence& images,
   return out;
 }
 
+/// Of the turns that two alignments expect, root of mean square, rad.
+double difference_of(const TurnAlignment& a, const TurnAlignment& b, const GyroTrack& gyro,
+                     const std::vector<ImageTurn>& turns) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const ImageTurn& turn : turns) {
+    const auto one = expected_turn(a, gyro, turn.from, turn.to);
+    const auto other = expected_turn(b, gyro, turn.from, turn.to);
+    if (!one || !other) continue;
+    sum += std::pow(one->angularDistance(*other), 2);
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+}
+
 }  // namespace
 
 Result<io::Sequence> open_images(const std::filesystem::path& images, const io::SequenceOptions& options) {
@@ -94,16 +109,23 @@ Result<ClockCalibration> calibrate_clock(const io::Sequence& images, const std::
   auto first =
       turns_of(images, {}, [&](std::size_t done) { return !progress || progress(done, 2 * images.size()); });
   if (!first) return first.error();
-  const auto coarse = align_turns(first->turns, gyro, believed);
-  if (!coarse) return refused(coarse.error(), first->tally);
-  const auto expected = [&](Time from, Time to) { return expected_turn(*coarse, gyro, from, to); };
-  auto second = turns_of(images, expected, [&](std::size_t done) {
-    return !progress || progress(images.size() + done, 2 * images.size());
-  });
-  if (!second) return second.error();
-  auto fine = realign_turns(second->turns, gyro, *coarse);
-  if (!fine) return refused(fine.error(), second->tally);
-  return ClockCalibration{std::move(*fine), second->tally, second->unreadable, second->gaps};
+  auto known = align_turns(first->turns, gyro, believed);
+  if (!known) return refused(known.error(), first->tally);
+  for (int pass = 2;; ++pass) {
+    const auto expected = [&](Time from, Time to) { return expected_turn(*known, gyro, from, to); };
+    auto seen = turns_of(images, expected, [&](std::size_t done) {
+      return !progress || progress(images.size() + done, 2 * images.size());
+    });
+    if (!seen) return seen.error();
+    auto fine = realign_turns(seen->turns, gyro, *known);
+    if (!fine) return refused(fine.error(), seen->tally);
+    const double moved = difference_of(*known, *fine, gyro, seen->turns);
+    known = std::move(fine);
+    constexpr double kSettled = 0.001;  // rad: the images are looked at from as good as there
+    constexpr int kMostPasses = 4;
+    if (moved < kSettled || pass == kMostPasses)
+      return ClockCalibration{std::move(*known), seen->tally, seen->unreadable, seen->gaps};
+  }
 }
 
 std::vector<std::string> untold_axes(const TurnAlignment& alignment) {

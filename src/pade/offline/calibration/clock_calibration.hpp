@@ -25,7 +25,7 @@ struct ClockCalibration {
 /// Opens the images of a sequence whose poses nobody needs. Errors: those of io::Sequence::open.
 Result<io::Sequence> open_images(const std::filesystem::path& images, const io::SequenceOptions& options);
 
-/// Looks at all images twice.
+/// Looks at all images twice, or up to four times where the first look misled.
 /// @param progress  called after every image with what is done and the total; false stops with
 /// io::interrupted_error(). May be empty.
 /// Errors: those of align_turns(), with what became of the images; more than half of the images unreadable.

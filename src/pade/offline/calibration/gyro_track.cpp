@@ -39,6 +39,14 @@ double GyroTrack::spread() const {
   return std::sqrt(sum);
 }
 
+double GyroTrack::noise() const {
+  std::vector<double> squares;
+  for (std::size_t i = 2; i < rates_.size(); ++i)
+    squares.push_back((rates_[i] - 2 * rates_[i - 1] + rates_[i - 2]).squaredNorm());
+  constexpr double kMedian = 2.366;  // of chi-square of three
+  return median(squares, 0.0) / kMedian / 6 * interval_;
+}
+
 std::optional<GyroTrack::At> GyroTrack::at(Time time) const {
   if (empty() || time < first() || time > last()) return std::nullopt;
   const auto after = std::upper_bound(times_.begin() + 1, times_.end() - 1, time);

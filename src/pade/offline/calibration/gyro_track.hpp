@@ -32,6 +32,8 @@ class GyroTrack {
   [[nodiscard]] double interval() const { return interval_; }  ///< between samples, median, s
   /// Root of mean square of the rates about their mean, rad/s.
   [[nodiscard]] double spread() const;
+  /// Of white noise in the turns, rad²/s: by the second differences of the rates, which motion hardly has.
+  [[nodiscard]] double noise() const;
   /// Empty outside of the samples, and where they have a gap of more than 0.1 s and five intervals.
   [[nodiscard]] std::optional<BodyTurn> between(Time from, Time to) const;
 

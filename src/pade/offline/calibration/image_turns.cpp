@@ -256,8 +256,14 @@ std::optional<ImageTurn> TurnMeter::add(const cv::Mat& grey, Time stamp,
   if (expected) start.R = guess.R_reference_other;
   const std::vector<Fit> fits = directions(start, expected.has_value());
   const double sigma = expected ? kExpectedSigma : kTurnSigma;
+  struct Told {
+    Matrix3d R, covariance;
+    double flow_sigma;
+  };
+  std::vector<Told> told;
   bool contradicted = false;
-  for (std::size_t i = 0, tried = 0; i < fits.size() && tried < 3; ++i) {
+  constexpr std::size_t kTried = 3;
+  for (std::size_t i = 0, tried = 0; i < fits.size() && tried < kTried; ++i) {
     const bool other =
         std::all_of(fits.begin(), fits.begin() + static_cast<std::ptrdiff_t>(i),
                     [&](const Fit& f) { return f.direction.dot(fits[i].direction) < std::cos(kOtherWay); });
@@ -278,8 +284,21 @@ std::optional<ImageTurn> TurnMeter::add(const cv::Mat& grey, Time stamp,
         H.bottomLeftCorner<3, 3>() * of_direction.ldlt().solve(H.topRightCorner<3, 3>());
     const Matrix3d covariance = (information + 1 / (sigma * sigma) * Matrix3d::Identity()).inverse();
     if (!covariance.allFinite()) continue;
+    told.push_back({refined.images.R_reference_other, covariance, refined.flow_sigma});
+    if (expected) break;
+  }
+  if (!told.empty()) {
+    // Of motions that explain the flow alike (a plane has two) the one with the least turn.
+    constexpr double kAlikeFlow = 1.3, kAlikePixels = 0.02;
+    double least = told[0].flow_sigma;
+    for (const Told& one : told) least = std::min(least, one.flow_sigma);
+    const Told* best = nullptr;
+    for (const Told& one : told) {
+      if (one.flow_sigma > kAlikeFlow * least + kAlikePixels) continue;
+      if (best == nullptr || rotation_log(one.R).norm() < rotation_log(best->R).norm()) best = &one;
+    }
     ++tally_.moving;
-    return turned(refined.images.R_reference_other, covariance);
+    return turned(best->R, best->covariance);
   }
   // Without parallax the rotation explains all but the flow's noise.
   constexpr double kStillSigma = 0.5;  // px

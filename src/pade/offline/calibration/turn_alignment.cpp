@@ -35,6 +35,7 @@ constexpr double kRemembered = 1.5;         // s over which errors of turns are 
 constexpr double kLeastExplained = 0.5;     // of the variance of the turns
 constexpr double kAlike = 1.5;              // variance left at another offset over that at the best
 constexpr double kUsefulSigma = 0.02;       // s
+constexpr double kAboveNoise = 3;           // information on the mounting over what noise makes
 constexpr int kSettledIteration = 100;
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -64,7 +65,7 @@ class TurnProblem {
  public:
   /// @param middle  time of an image at which the offset is that of the guess
   TurnProblem(const std::vector<ImageTurn>& turns, const GyroTrack& gyro, Time middle)
-      : turns_(turns), gyro_(gyro), middle_(middle) {}
+      : turns_(turns), gyro_(gyro), middle_(middle), noise_(gyro.noise()) {}
 
   /// Solves from a guess on.
   void solve(Guess& guess) {
@@ -196,16 +197,18 @@ class TurnProblem {
   [[nodiscard]] std::vector<Vector3d> untold() const {
     Matrix3d information = Matrix3d::Zero();
     double noise = 0;
-    for (const Residual& r : residuals_) {
+    for (std::size_t k = 0; k < turns_.size(); ++k) {
+      const Residual& r = residuals_[k];
       if (!r.used) continue;
-      const auto J = r.J.middleCols<3>(2);
+      const Eigen::Matrix3d J = r.J.middleCols<3>(2);
+      const double variance = noise_ * seconds_between(turns_[k].from, turns_[k].to);
       information += r.robust * J.transpose() * r.weight * J;
-      noise += r.robust * 2 * added_ * r.weight.trace() / 3;
+      noise += r.robust * 2 * variance * r.weight.trace() / 3;
     }
     const Eigen::SelfAdjointEigenSolver<Matrix3d> parts(information);
     std::vector<Vector3d> axes;
     for (int i = 0; i < 3; ++i)
-      if (parts.eigenvalues()[i] < 2 * noise) axes.emplace_back(parts.eigenvectors().col(i));
+      if (parts.eigenvalues()[i] < kAboveNoise * noise) axes.emplace_back(parts.eigenvectors().col(i));
     return axes;
   }
 
@@ -272,6 +275,7 @@ class TurnProblem {
   const std::vector<ImageTurn>& turns_;
   const GyroTrack& gyro_;
   Time middle_;
+  double noise_;  // of the gyroscope, rad²/s
   Quaterniond prior_ = Quaterniond::Identity();
   std::vector<Residual> residuals_;
   double added_ = 0;  // rad²
