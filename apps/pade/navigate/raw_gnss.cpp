@@ -99,7 +99,7 @@ bool is_raw_gnss_file(const std::string& path) {
   std::error_code failure;
   if (!std::filesystem::is_regular_file(path, failure)) return false;
   if (is_named_so(path)) return true;  // what is in it is for the reader to say
-  std::string start(200, '\0');
+  std::string start(io::kRawGnssStart, '\0');
   std::ifstream stream(path, std::ios::binary);
   stream.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<std::size_t>(stream.gcount()));
