@@ -61,6 +61,9 @@ struct NavigateArguments {
   std::string raw_coupling;
   std::string raw_gnss;
   double elevation_mask = 10;
+  gnss::PositioningOptions noise;  ///< whose sigmas are asked for
+  CLI::Option* doppler_sigma_given = nullptr;
+  CLI::Option* phase_sigma_given = nullptr;
   bool force = false;
   bool json = false;
   const CLI::App* command = nullptr;
@@ -171,8 +174,11 @@ nlohmann::ordered_json summary(const NavigationRun& run, const Score& score, con
 }
 
 gnss::PositioningOptions positioning_options(const NavigateArguments& arguments) {
-  gnss::PositioningOptions options;
+  gnss::PositioningOptions options = arguments.noise;
   options.elevation_mask = arguments.elevation_mask * kDegree;
+  // Who knows the receiver is believed.
+  options.estimate_doppler_sigma = arguments.doppler_sigma_given->count() == 0;
+  options.estimate_phase_sigma = arguments.phase_sigma_given->count() == 0;
   return options;
 }
 
@@ -244,14 +250,16 @@ Status navigate(const NavigateArguments& arguments) {
     return navigate_odometry(odometry);
   }
   if (arguments.raw || is_raw_gnss_file(arguments.log)) {
-    const Status fits =
-        refuse_unused(*arguments.command, {"--out", "--raw", "--elevation-mask", "--force", "--json"},
-                      "raw GNSS alone, without an IMU");
+    const Status fits = refuse_unused(*arguments.command,
+                                      {"--out", "--raw", "--elevation-mask", "--pseudorange-sigma",
+                                       "--doppler-sigma", "--phase-sigma", "--force", "--json"},
+                                      "raw GNSS alone, without an IMU");
     if (!fits) return fits;
     return navigate_raw(
         {arguments.log, arguments.out, positioning_options(arguments), arguments.force, arguments.json});
   }
-  for (const char* option : {"--raw-gnss", "--elevation-mask"}) {
+  for (const char* option :
+       {"--raw-gnss", "--elevation-mask", "--pseudorange-sigma", "--doppler-sigma", "--phase-sigma"}) {
     if (arguments.raw_coupling.empty() && arguments.command->get_option(option)->count() > 0) {
       return Error{fmt::format(
           "{}: found it without --raw-coupling, expected both: alone it would do nothing", option)};
@@ -414,6 +422,17 @@ void add_navigate(CLI::App& app, Context& context) {
                             : fmt::format("found {}, expected 0 to 60 degrees", io::in_quotes(text));
           },
           "FLOAT in [0 - 60]"));
+  const auto add_sigma = [&](const char* name, double& sigma, double most, const char* what) {
+    return command->add_option(name, sigma, what)->capture_default_str()->check(CLI::Range(1e-6, most));
+  };
+  add_sigma("--pseudorange-sigma", arguments->noise.pseudorange_sigma, 1e3,
+            "Of raw GNSS: noise of a pseudorange in the zenith at 45 dB-Hz, m");
+  arguments->doppler_sigma_given =
+      add_sigma("--doppler-sigma", arguments->noise.doppler_sigma, 100,
+                "The same of the range's rate, m/s; if it is not given it grows to what the residuals show");
+  arguments->phase_sigma_given =
+      add_sigma("--phase-sigma", arguments->noise.phase_sigma, 1,
+                "The same of the phase, m; if it is not given it grows to what the residuals show");
   command
       ->add_option("--raw-coupling", arguments->raw_coupling,
                    "Raw GNSS beside the IMU in place of gnss.csv: tight, each satellite for itself "
