@@ -15,10 +15,12 @@ set(pade_public_headers
   core/health.hpp
   core/lie.hpp
   core/options.hpp
+  core/point_cloud.hpp
   core/pose.hpp
   core/result.hpp
   core/sensors/measurements.hpp
   core/sensors/navigation_log.hpp
+  core/sensors/pose_jumps.hpp
   core/time.hpp
   navigation/camera/camera_motion.hpp
   navigation/filter_options.hpp
@@ -38,7 +40,9 @@ set(pade_public_headers
   depth/motion/stamp_clock.hpp
   depth/multi_view/common_error.hpp
   depth/multi_view/views_depth.hpp
+  mapping/back_projection.hpp
   mapping/occupancy_map.hpp
+  mapping/query/map_border.hpp
   mapping/query/map_view.hpp
   io/atomic_output.hpp
   io/formats/map_files.hpp

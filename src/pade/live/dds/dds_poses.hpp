@@ -35,7 +35,7 @@ class DdsPoses : public PoseSource {
   /// none comes from messages more than 0.25 s apart.
   [[nodiscard]] PoseAnswer at(Time time) override;
   /// How often the poses have jumped: their frame has another name, stamps went back or began anew, or a step
-  /// or turn is not what the motion before leads to.
+  /// or turn is not what the motion before leads to (core/sensors/pose_jumps.hpp).
   [[nodiscard]] std::size_t jumps() const override { return jumps_; }
   [[nodiscard]] Time newest() override;
   [[nodiscard]] std::size_t count() const override { return come_; }
@@ -52,7 +52,6 @@ class DdsPoses : public PoseSource {
   };
   void pull();
   void take(std::string_view bytes);
-  [[nodiscard]] bool is_jump(const Sample& next) const;
   void jump();
   void refuse(std::string why);
 
