@@ -130,7 +130,7 @@ double DdsPoses::turned_since(Time time) {
 std::string DdsPoses::missing() {
   const Time last = newest();
   const bool any = last.nanoseconds != 0;
-  if (any && seconds_between(last, shared_.clock.now()) < kStale) return {};
+  if (any && seconds_between(last, shared_.clock.now()) - behind() < kStale) return {};
   if (!problem_.empty()) return fmt::format("{}: {}", options_.poses, problem_);
   const std::string why = reader_->remark();
   return why.empty() ? fmt::format("nothing on {}{}", options_.poses, any ? " any more" : "") : why;

@@ -29,6 +29,7 @@ class DdsPoses : public PoseSource {
            const Pose& T_body_camera);
 
   [[nodiscard]] bool in_our_time() const override { return true; }
+  [[nodiscard]] double behind() const override { return shared_.clock.behind(); }
   /// Messages of the autopilot say nothing of these poses.
   void add(const mavlink::Frame& /*frame*/) override {}
   /// Between two messages: rotation and position each on their straight way. No pose is extrapolated, and

@@ -131,12 +131,17 @@ function drawRing (scan) {
   g.fillStyle = '#dfe4e8'
   g.textAlign = 'center'
   g.font = '600 18px system-ui, sans-serif'
-  g.fillText(known.length ? Math.min(...known).toFixed(1) + ' m' : 'no obstacle', middle, middle + 26)
+  g.fillText(known.length ? Math.min(...known).toFixed(1) + ' m' : nothingNear(scan.ranges), middle, middle + 26)
   g.beginPath() // the vehicle
   g.moveTo(middle, middle - 18)
   g.lineTo(middle + 10, middle + 6)
   g.lineTo(middle - 10, middle + 6)
   g.fill()
+}
+
+/// Where no sector has a distance: they are unknown, or free.
+function nothingNear (ranges) {
+  return ranges.every(Number.isNaN) ? 'unknown' : ranges.some(Number.isNaN) ? 'none seen' : 'no obstacle'
 }
 
 /// Voxels, vehicle and path, seen from behind and above until somebody drags.
