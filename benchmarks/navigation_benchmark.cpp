@@ -3,6 +3,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "pade/navigation/filter.hpp"
 #include "pade/navigation/navigator.hpp"
 
 #include "../tests/navigation/flight.hpp"

@@ -14,12 +14,12 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/core/compute/simd.hpp"
 #include "pade/flow/epipolar/epipolar.hpp"
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/io/formats/flow_file.hpp"
+#include "pade/io/image/image_codec.hpp"
 
 #include "flow/epipolar/forward_flight.hpp"
 
@@ -36,10 +36,12 @@ std::optional<Scene> venus() {
       std::filesystem::path(given != nullptr ? given : PADE_SOURCE_DIR "/../shared/data/flow") /
       "middlebury/Venus";
   Scene scene;
-  scene.first = cv::imread((folder / "frame10.png").string(), cv::IMREAD_GRAYSCALE);
-  scene.second = cv::imread((folder / "frame11.png").string(), cv::IMREAD_GRAYSCALE);
+  const auto first = pade::io::load_image(folder / "frame10.png", pade::io::Pixels::grey);
+  const auto second = pade::io::load_image(folder / "frame11.png", pade::io::Pixels::grey);
   const auto truth = pade::io::read_flow(folder / "flow10.flo");
-  if (scene.first.empty() || scene.second.empty() || !truth) return std::nullopt;
+  if (!first || !second || !truth) return std::nullopt;
+  scene.first = *first;
+  scene.second = *second;
   scene.truth = *truth;
   scene.lines.direction = cv::Mat(scene.first.size(), CV_32FC2, cv::Scalar(1, 0));
   return scene;

@@ -26,6 +26,7 @@ using Eigen::Vector3d;
 
 constexpr double kRadius = 0.45;
 constexpr double kLength = 5;
+constexpr std::size_t kPoints = 4096;
 
 /// The courtyard after a flight through it.
 struct Known {
@@ -35,15 +36,18 @@ struct Known {
   std::unique_ptr<octomap::OcTree> tree = map.octree();
   Vector3d middle = flight.T_world_camera[5].translation;
   std::vector<Vector3d> points;               // in known space
+  std::vector<Vector3d> anywhere;             // nine of ten in unknown space
   std::vector<std::array<Vector3d, 2>> ways;  // of 5 m, most of them clear all along
 
   Known() {
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> unit(-1, 1);
-    while (points.size() < 4096) {
+    while (points.size() < kPoints || anywhere.size() < kPoints) {
       const double x = unit(random);
       const double y = unit(random);
-      points.push_back(middle + 8 * Vector3d(x, y, 0.3 * unit(random)));
+      const Vector3d at = middle + 8 * Vector3d(x, y, 0.3 * unit(random));
+      if (anywhere.size() < kPoints) anywhere.push_back(at);
+      if (points.size() < kPoints && view->at(at) != Occupancy::unknown) points.push_back(at);
     }
     // Two thirds clear along the whole of it, as most that a planner looks at; the others as they come.
     while (ways.size() < 200) {
@@ -62,22 +66,28 @@ const Known& known() {
   return data;
 }
 
-void PointQuery(benchmark::State& state) {
-  const Known& data = known();
-  std::size_t i = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(data.view->at(data.points[i++ & 4095U]));
+const std::vector<Vector3d>& points_of(const benchmark::State& state) {
+  return state.range(0) != 0 ? known().anywhere : known().points;
 }
-BENCHMARK(PointQuery);
+
+void PointQuery(benchmark::State& state) {
+  const MapView& view = *known().view;
+  const std::vector<Vector3d>& points = points_of(state);
+  std::size_t i = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(view.at(points[i++ % kPoints]));
+}
+BENCHMARK(PointQuery)->ArgName("anywhere")->Arg(0)->Arg(1);
 
 void PointQueryByOctree(benchmark::State& state) {
-  const Known& data = known();
+  const octomap::OcTree& tree = *known().tree;
+  const std::vector<Vector3d>& points = points_of(state);
   std::size_t i = 0;
   for (auto _ : state) {
-    const Vector3d& p = data.points[i++ & 4095U];
-    benchmark::DoNotOptimize(data.tree->search(p.x(), p.y(), p.z()));
+    const Vector3d& p = points[i++ % kPoints];
+    benchmark::DoNotOptimize(tree.search(p.x(), p.y(), p.z()));
   }
 }
-BENCHMARK(PointQueryByOctree);
+BENCHMARK(PointQueryByOctree)->ArgName("anywhere")->Arg(0)->Arg(1);
 
 void SweptBall(benchmark::State& state) {
   const Known& data = known();

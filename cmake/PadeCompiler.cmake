@@ -8,10 +8,16 @@ endif()
 
 # Contraction to fused multiply-add would make the result depend on the machine; see docs/design.md.
 add_compile_options(-ffp-contract=off)
+# Eigen fuses by itself on aarch64, where this says that it can. (The notes are of what changed in GCC 10.)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  add_compile_options(-U__ARM_FEATURE_FMA $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
+endif()
 
 if(PADE_SANITIZE)
   add_compile_options(-fsanitize=${PADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${PADE_SANITIZE})
+  # Their dlopen is not the program's, so that only the older kind of run path counts for it.
+  add_link_options(-Wl,--disable-new-dtags)
   # What the sanitizers add hides from g++ that standard containers are initialised (seen in std::regex).
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     add_compile_options(-Wno-maybe-uninitialized)

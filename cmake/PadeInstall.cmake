@@ -1,5 +1,6 @@
 # What `cmake --install` and `cpack` put where: the program (component "pade"), the library with its headers (component
-# "libpade-dev") and, where it is built, the Python module (component "python3-pade", whose files python/ installs).
+# "libpade-dev") and, where they are built, the module for more image formats (component "pade-image-formats") and the Python
+# module (component "python3-pade", whose files python/ installs).
 include(CMakePackageConfigHelpers)
 
 set(pade_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pade)
@@ -15,10 +16,12 @@ set(pade_public_headers
   core/health.hpp
   core/lie.hpp
   core/options.hpp
+  core/point_cloud.hpp
   core/pose.hpp
   core/result.hpp
   core/sensors/measurements.hpp
   core/sensors/navigation_log.hpp
+  core/sensors/pose_jumps.hpp
   core/time.hpp
   navigation/camera/camera_motion.hpp
   navigation/filter_options.hpp
@@ -38,7 +41,9 @@ set(pade_public_headers
   depth/motion/stamp_clock.hpp
   depth/multi_view/common_error.hpp
   depth/multi_view/views_depth.hpp
+  mapping/back_projection.hpp
   mapping/occupancy_map.hpp
+  mapping/query/map_border.hpp
   mapping/query/map_view.hpp
   io/atomic_output.hpp
   io/formats/map_files.hpp
@@ -66,16 +71,26 @@ install(FILES ${PROJECT_BINARY_DIR}/padeConfig.cmake ${PROJECT_BINARY_DIR}/padeC
               ${PROJECT_SOURCE_DIR}/cmake/PadeDependencies.cmake ${PROJECT_SOURCE_DIR}/cmake/FindPadeOpenCV.cmake
         DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
 
+# The program finds the module by its name, in the folder of libraries beside its own.
+file(RELATIVE_PATH _libraries ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
+set_target_properties(pade_cli PROPERTIES INSTALL_RPATH "$ORIGIN/${_libraries}")
 install(TARGETS pade_cli RUNTIME COMPONENT pade)
+if(TARGET pade_image_formats)
+  install(TARGETS pade_image_formats LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT pade-image-formats)
+endif()
 # Where systemd looks beside the packages' own.
 configure_file(${PROJECT_SOURCE_DIR}/config/systemd/pade-live@.service.in ${PROJECT_BINARY_DIR}/pade-live@.service @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/pade-live@.service DESTINATION lib/systemd/system COMPONENT pade)
-foreach(component pade libpade-dev)
+set(_packages pade libpade-dev)
+if(TARGET pade_image_formats)
+  list(APPEND _packages pade-image-formats)
+endif()
+foreach(component IN LISTS _packages)
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${component} RENAME copyright
           COMPONENT ${component})
 endforeach()
 
-# Two Debian packages, three with the Python module: cpack -G DEB
+# The Debian packages, one per component: cpack -G DEB
 set(CPACK_PACKAGE_NAME pade)
 set(CPACK_PACKAGE_CONTACT "The PADE authors <${PROJECT_HOMEPAGE_URL}/issues>")
 set(CPACK_DEBIAN_PACKAGE_HOMEPAGE ${PROJECT_HOMEPAGE_URL})
@@ -84,19 +99,23 @@ set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
 set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL pade libpade-dev)
+set(CPACK_COMPONENTS_ALL ${_packages})
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "")
 set(CPACK_DEBIAN_PADE_PACKAGE_NAME pade)
 set(CPACK_DEBIAN_PADE_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PADE_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PADE_PACKAGE_RECOMMENDS libjs-three)  # the 3-D view of `pade live --web`
+set(CPACK_DEBIAN_PADE_PACKAGE_SUGGESTS pade-image-formats)  # brings OpenCV's imgcodecs with GDAL
+set(CPACK_DEBIAN_PADE-IMAGE-FORMATS_PACKAGE_NAME pade-image-formats)
+set(CPACK_DEBIAN_PADE-IMAGE-FORMATS_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PADE-IMAGE-FORMATS_PACKAGE_SHLIBDEPS ON)
+set(CPACK_COMPONENT_PADE-IMAGE-FORMATS_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: image formats other than PNG, JPEG, PGM and PPM.")
 set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_NAME libpade-dev)
 set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_DEPENDS
-    "libeigen3-dev (>= 3.4), libopencv-core-dev (>= 4.6), libopencv-imgproc-dev, libopencv-imgcodecs-dev, \
-libopencv-video-dev, liboctomap-dev (>= 1.9), libgeographiclib-dev (>= 2.1), libyaml-cpp-dev (>= 0.7), \
+    "libeigen3-dev (>= 3.4), libopencv-core-dev (>= 4.6), libopencv-imgproc-dev, \
+libopencv-video-dev, libpng-dev, libjpeg-dev, liboctomap-dev (>= 1.9), libgeographiclib-dev (>= 2.1), libyaml-cpp-dev (>= 0.7), \
 nlohmann-json3-dev (>= 3.11), libfmt-dev (>= 9)")
 foreach(pair IN ITEMS bzip2/libbz2-dev lz4/liblz4-dev sqlite/libsqlite3-dev zstd/libzstd-dev)
   string(REPLACE "/" ";" pair ${pair})

@@ -8,7 +8,8 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 packages_build=(
   g++ cmake ninja-build
   libeigen3-dev
-  libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-video-dev
+  libopencv-core-dev libopencv-imgproc-dev libopencv-video-dev
+  libpng-dev libjpeg-dev
   liboctomap-dev libgeographiclib-dev
   libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libboost-dev
   libsdformat-dev libembree-dev libassimp-dev  # the simulator, 15 MB of 58; the build does without where they are missing
@@ -17,9 +18,11 @@ packages_build=(
   libompl-dev  # `pade plan`; the build does without where it is missing
 )
 packages_test=(libgtest-dev libgmock-dev)
+packages_formats=(libopencv-imgcodecs-dev)  # TIFF, BMP, WebP ... and the oracle of our image files; brings GDAL, so `run` does without
 packages_lint=(clang-format clang-tidy)
 packages_docs=(doxygen)
 packages_dds=(cyclonedds-dev libfastrtps-dev)  # topics of ROS 2 and the peer that they are tested with: for scripts/dds alone
+packages_video=(libavformat-dev libavcodec-dev libswscale-dev ffmpeg)  # videos as cameras, and who makes them: for scripts/video-oracle
 packages_python=(pybind11-dev python3-dev python3-numpy python3-build python3-venv mypy)  # for scripts/python alone
 
 assume_yes=false

@@ -20,6 +20,7 @@ void add_flow(CLI::App& app, Context& context);
 void add_simulate(CLI::App& app, Context& context);
 void add_fly(CLI::App& app, Context& context);
 void add_navigate(CLI::App& app, Context& context);
+void add_calibrate(CLI::App& app, Context& context);
 void add_convert(CLI::App& app, Context& context);
 void add_live(CLI::App& app, Context& context);
 void add_plan(CLI::App& app, Context& context);

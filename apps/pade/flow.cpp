@@ -5,11 +5,11 @@
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/flow/flow_estimator.hpp"
 #include "pade/io/formats/flow_file.hpp"
 #include "pade/io/formats/flow_picture.hpp"
+#include "pade/io/image/image_codec.hpp"
 
 #include "commands.hpp"
 #include "grey_image.hpp"
@@ -35,10 +35,10 @@ void refuse(Context& context, const Error& error) {
 Status check_picture(const FlowArguments& arguments) {
   if (arguments.picture.empty() && arguments.full_scale_given->count() > 0)
     return Error{"--full-scale: found it without --picture, expected both: alone it would do nothing"};
-  if (arguments.picture.empty() || cv::haveImageWriter(arguments.picture)) return {};
-  return Error{
-      fmt::format("--picture: found {}, expected the name of a picture that can be written: .png, .jpg ...",
-                  arguments.picture)};
+  if (arguments.picture.empty()) return {};
+  const Status name = io::check_image_name(arguments.picture);
+  return name ? name
+              : Status(Error{fmt::format("--picture {}: {}", arguments.picture, name.error().message)});
 }
 
 Status compute(const FlowArguments& arguments) {
@@ -61,11 +61,8 @@ Status compute(const FlowArguments& arguments) {
   if (!arguments.out.empty()) {
     if (Status written = io::write_flow(arguments.out, field.vectors); !written) return written;
   }
-  if (!arguments.picture.empty() &&
-      !cv::imwrite(arguments.picture, io::flow_picture(field.vectors, arguments.full_scale))) {
-    return Error{fmt::format("{}: cannot be written", arguments.picture)};
-  }
-  return {};
+  if (arguments.picture.empty()) return {};
+  return io::save_image(arguments.picture, io::flow_picture(field.vectors, arguments.full_scale));
 }
 
 }  // namespace

@@ -4,17 +4,13 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/core/result.hpp"
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::cli {
 
 /// CV_8UC1, or the error that names the file.
-inline Result<cv::Mat> read_grey(const std::string& file) {
-  cv::Mat image = cv::imread(file, cv::IMREAD_GRAYSCALE);
-  if (image.empty()) return Error{fmt::format("{}: not a readable image", file)};
-  return image;
-}
+inline Result<cv::Mat> read_grey(const std::string& file) { return io::load_image(file, io::Pixels::grey); }
 
 }  // namespace pade::cli

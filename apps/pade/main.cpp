@@ -24,6 +24,7 @@ int run(int argc, char** argv) {
   pade::cli::add_simulate(app, context);
   pade::cli::add_fly(app, context);
   pade::cli::add_navigate(app, context);
+  pade::cli::add_calibrate(app, context);
   pade::cli::add_convert(app, context);
   pade::cli::add_live(app, context);
   pade::cli::add_plan(app, context);

@@ -22,6 +22,7 @@
 
 #include "commands.hpp"
 #include "enum_option.hpp"
+#include "options/sensor_log.hpp"
 #include "progress.hpp"
 
 namespace pade::cli {
@@ -41,7 +42,8 @@ struct MapArguments {
   bool no_report = false;
   int threads = 1;
 
-  std::optional<std::string> flow, poses, calibration, world_up, origin, topics, refine_motion, feed_camera;
+  std::optional<std::string> flow, poses, calibration, world_up, origin, topics, refine_motion, feed_camera,
+      log, time_offset;
   std::optional<DepthFrom> depth;
   std::optional<depth::Model> model;
   std::optional<depth::Reading> reading;
@@ -101,6 +103,8 @@ Result<MapSequenceOptions> options_of(const MapArguments& arguments) {
   set(options.sequence.origin, arguments.origin);
   set(options.sequence.camera, arguments.camera);
   set(options.sequence.topics, arguments.topics);
+  set(options.log, arguments.log);
+  set(options.time_offset, arguments.time_offset);
   if (arguments.feed_camera) options.navigation.filter.camera = *arguments.feed_camera == "on";
   options.sequence.strict = options.sequence.strict || arguments.strict;
   options.world_coordinates = options.world_coordinates || arguments.world_coordinates;
@@ -115,7 +119,19 @@ Result<MapResult> map(const MapArguments& arguments) {
   if (!options) return options.error();
   const auto stacks = io::ImageStacks::parse(arguments.save);
   if (!stacks) return stacks.error();
-  const auto sequence = open_sequence(arguments.sequence, *options);
+  const auto read = [](const std::filesystem::path& place, const std::string& topics) {
+    io::NavigationLogOptions log_options;
+    log_options.topics = topics;
+    return read_sensor_log(place, log_options);
+  };
+  std::optional<Progress> search;
+  const auto compared = [&](std::size_t done, std::size_t total) {
+    if (!search) search.emplace("Comparing turns", total);
+    search->show(done, "");
+    return !io::interrupted();
+  };
+  const auto sequence = open_sequence(arguments.sequence, *options, read, compared);
+  search.reset();
   if (!sequence) return sequence.error();
   io::RunWriterOptions output;
   output.overwrite = arguments.force ? io::Overwrite::replace : io::Overwrite::refuse;
@@ -247,6 +263,7 @@ void add_map(CLI::App& app, Context& context) {
       "report.html and, if the flight has true depth, evaluation.json and .csv.\n"
       "Examples:\n"
       "  pade map flight --out run\n"
+      "  pade map images --out run --poses from-imu-gnss --log flight.ulg --time-offset auto\n"
       "  pade map flight --out run --flow dis-fast --range 40 --save depth,sigma,state,bound\n"
       "  pade map flight --out literal --paper");
   map->add_option("sequence", a->sequence, "folder or recording of the flight")->required();
@@ -256,6 +273,14 @@ void add_map(CLI::App& app, Context& context) {
       "--poses", a->poses,
       "groundtruth (default), original, from-imu-gnss (imu.csv and gnss.csv through the navigation\n"
       "filter), or a pose file (TUM)");
+  map->add_option(
+      "--log", a->log,
+      "for --poses from-imu-gnss: where the sensors are, if not beside the images: .ulg, .tlog, a "
+      "recording\nof ROS, a folder");
+  map->add_option(
+      "--time-offset", a->time_offset,
+      "for --poses from-imu-gnss: time of a pose = time of the image + this, s; or auto: found from the\n"
+      "turns of images and gyroscope, as pade calibrate time does (default: what the calibration says)");
   add_enum(*map, "--imu", a->imu, "class of the IMU, for --poses from-imu-gnss (default industrial)");
   map->add_option(
          "--feed-camera", a->feed_camera,

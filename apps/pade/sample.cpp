@@ -13,9 +13,9 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/io/atomic_output.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/simulation/analytic/analytic_flights.hpp"
 #include "pade/simulation/analytic/analytic_render.hpp"
@@ -46,8 +46,8 @@ struct SampleArguments {
 };
 
 Status write_png(const io::OutputFolder& folder, const std::string& name, const cv::Mat& image) {
-  std::vector<unsigned char> png;
-  if (!cv::imencode(".png", image, png)) return Error{fmt::format("{}: cannot be encoded as PNG", name)};
+  const std::vector<std::uint8_t> png = io::encode_png(image);
+  if (png.empty()) return Error{fmt::format("{}: cannot be encoded as PNG", name)};
   return folder.write(name, png);
 }
 

@@ -120,14 +120,18 @@ struct PathPose {
 
 /// What became of a frame. Pointers are valid until the sink returns.
 struct FrameResult {
-  Stamp stamp = 0;
-  std::string world_frame, camera_frame;
-  std::string body_frame;  ///< of `T_world_body`; empty where nobody needs to be told
-  Placement T_world_body;  ///< of our own filter
+  Stamp stamp = 0;                        ///< of the image that depth, sigma and cloud are of
+  std::string world_frame, camera_frame;  ///< the map's world, in which cloud and path are
+  Stamp pose_stamp = 0;                   ///< of the newest pose of the path, of `T_world_body` and `origin`
+  std::string poses_frame;         ///< the world of the poses: `world_frame`, unless there is an origin
+  std::array<double, 3> origin{};  ///< where the map's 0 0 0 is in it, m
+  std::string body_frame;  ///< of `T_world_body`; empty where nobody needs to be told, or it is not known
+  Placement T_world_body;  ///< of our own filter, in `poses_frame`
   int width = 0, height = 0;
-  const float* depth = nullptr;   ///< Z, m, NaN: none; rows one behind the other
-  std::vector<float> sigma;       ///< of it, m; empty where it is not wanted
-  std::vector<CloudPoint> cloud;  ///< empty where it is not wanted
+  const float* depth = nullptr;       ///< Z, m, NaN: none; rows one behind the other
+  std::shared_ptr<const void> owner;  ///< of the depth
+  std::vector<float> sigma;           ///< of it, m; empty where it is not wanted
+  std::vector<CloudPoint> cloud;      ///< empty where it is not wanted
   const std::vector<PathPose>* path = nullptr;
 };
 
@@ -184,6 +188,8 @@ struct Settings {
   bool publish_tf = false;
   bool save_on_exit = false;
 };
+/// A parameter's number as text, with all its digits.
+std::string text_of(double value);
 /// Reads the parameters. False, with a message that names the parameter, where one is unknown or makes no
 /// sense.
 bool read_settings(const Parameters& parameters, Settings& settings, std::string& error);

@@ -37,6 +37,10 @@ struct Counts {
   double depth_share = 0;                      ///< of the pixels of the last frame
   double last_depth = -1;                      ///< when a frame gave enough of it, steady seconds
   Recent latency, work;                        ///< s
+  std::size_t outside = 0;                     ///< points beyond what a map can hold, which no map has
+  std::size_t outside_now = 0;                 ///< of these, of the newest frame
+  std::string origin = "0 0 0";                ///< of the map in the world of the poses, m
+  std::string stamps;  ///< what the images say of their stamps; empty: nothing is wrong
 };
 
 }  // namespace pade_ros

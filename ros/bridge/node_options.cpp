@@ -70,6 +70,8 @@ pade::Status check(const NodeOptions& options) {
     return pade::Error{fmt::format("option occupancy_min_z is {}, expected less than occupancy_max_z, {}",
                                    options.occupancy_min_z, options.occupancy_max_z)};
   }
+  if (options.map_frame.empty())
+    return pade::Error{"option map_frame is empty, expected the name of a frame that nobody else publishes"};
   if (!options.map_file.ends_with(".bt") && !options.map_file.ends_with(".ot"))
     return pade::Error{
         fmt::format("option map_file is \"{}\", expected a name that ends in .bt or .ot", options.map_file)};

@@ -33,6 +33,7 @@ inline pade::ObstacleMapperOptions mapper_of_long_flights() {
 struct NodeOptions {
   PoseKind poses = PoseKind::odometry;
   std::string world_frame;
+  std::string map_frame = "pade_map";
   std::string base_frame = "base_link";
   std::string camera_frame;
   std::string mounting;
@@ -60,7 +61,9 @@ struct NodeOptions {
     field("poses", self.poses, "odometry | pose | tf | sensors: where poses come from");
     field("world_frame", self.world_frame,
           "of the map; empty: that of the poses, and map for tf and sensors");
-    field("base_frame", self.base_frame, "whose poses PoseStamped has");
+    field("map_frame", self.map_frame,
+          "of the map where the poses are so far from their 0 0 0 that it has one of its own");
+    field("base_frame", self.base_frame, "whose poses PoseStamped and the filter's transform have");
     field("camera_frame", self.camera_frame, "empty: that of the images");
     field("mounting", self.mounting,
           "camera on the frame of the poses, x y z qx qy qz qw; empty: as the transforms say");

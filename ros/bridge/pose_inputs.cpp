@@ -18,8 +18,14 @@ using pade::Pose;
 using pade::seconds_between;
 using pade::Time;
 
-constexpr double kKept = 10;             // s
-constexpr double kFarthestApart = 0.25;  // s, as `pade live` has it
+constexpr double kKept = 10;  // s
+
+constexpr const char* kNamelessWorld = "map";
+
+struct Sample {
+  Time time;
+  Pose pose;
+};
 
 /// nav_msgs/Odometry or geometry_msgs/PoseStamped.
 class TopicPoses : public PoseInput {
@@ -43,8 +49,8 @@ class TopicPoses : public PoseInput {
     } else if (!samples_.empty() && seconds_between(time, samples_.back().time) > kClockWentBack) {
       jump(fmt::format("the stamps of the poses went back by {:.1f} s",
                        seconds_between(time, samples_.back().time)));
-    } else if (const double off = unexpected(time, pose.translation); off > 0) {
-      jump(fmt::format("the poses jumped by {:.2f} m", off));
+    } else if (const auto found = pade::jump_to(samples_, time, pose)) {
+      jump(jump_text(*found, "the poses"));
     }
     world_ = world;
     child_ = child;
@@ -82,7 +88,8 @@ class TopicPoses : public PoseInput {
 
   std::string world() override {
     const std::lock_guard lock(mutex_);
-    return options_.world_frame.empty() ? world_ : frame_name(options_.world_frame);
+    if (!options_.world_frame.empty()) return frame_name(options_.world_frame);
+    return world_.empty() ? kNamelessWorld : world_;  // that of messages which name none
   }
 
   Diagnosis diagnose(double now) override {
@@ -107,41 +114,16 @@ class TopicPoses : public PoseInput {
                   {"out_of_order", fmt::format("{}", out_of_order_)},
                   {"jumps", fmt::format("{}", jumps_)},
                   {"last_jump", last_jump_},
-                  {"world_frame", world_},
+                  {"world_frame", world_.empty() && rate_.count() > 0 ? "(the messages name none)" : world_},
                   {"pose_of", child_.empty() ? options_.base_frame : child_}};
     return out;
   }
 
  private:
-  struct Sample {
-    Time time;
-    Pose pose;
-  };
-
   void jump(const std::string& why) {
     samples_.clear();
     ++jumps_;
     last_jump_ = why;
-  }
-
-  /// How far a place is from where the last poses lead to; 0 where a vehicle may be there.
-  [[nodiscard]] double unexpected(Time time, const Eigen::Vector3d& place) const {
-    constexpr double kUnsaid = 0.3;       // m
-    constexpr double kAcceleration = 30;  // m/s²
-    constexpr double kLeastSpan = 0.05;   // s, for a velocity
-    if (samples_.size() < 2) return 0;
-    const Sample& last = samples_.back();
-    const double dt = seconds_between(last.time, time);
-    if (!(dt > 0) || dt > kFarthestApart) return 0;
-    const auto before = std::find_if(samples_.rbegin(), samples_.rend(), [&](const Sample& sample) {
-      return seconds_between(sample.time, last.time) >= kLeastSpan;
-    });
-    if (before == samples_.rend()) return 0;
-    const double span = seconds_between(before->time, last.time);
-    if (span > 2 * kFarthestApart) return 0;
-    const Eigen::Vector3d velocity = (last.pose.translation - before->pose.translation) / span;
-    const double off = (place - last.pose.translation - dt * velocity).norm();
-    return off > kUnsaid + kAcceleration * dt * (dt + span) / 2 ? off : 0;
   }
 
   /// False, with the reason in `reply`, if there is none.
@@ -165,7 +147,7 @@ class TopicPoses : public PoseInput {
     }
     const Sample& before = *std::prev(after);
     const double gap = seconds_between(before.time, after->time);
-    if (gap > kFarthestApart) {
+    if (gap > pade::kFarthestPosesApart) {
       reply.kind = Kind::never;
       reply.why = "a gap in the poses";
       return false;
@@ -196,6 +178,7 @@ class TransformPoses : public PoseInput {
     const auto answer = transforms_.find(world(), camera, time.nanoseconds, placement, reply.why);
     const std::lock_guard lock(mutex_);
     if (answer == Transforms::Answer::valid) {
+      follow({time, pose_of(placement)}, camera);
       reply.kind = PoseReply::Kind::valid;
       reply.T_world_camera = reply.T_world_body = pose_of(placement);
       rate_.tick(steady_seconds());
@@ -203,11 +186,21 @@ class TransformPoses : public PoseInput {
       reply.kind = answer == Transforms::Answer::never ? PoseReply::Kind::never : PoseReply::Kind::not_yet;
       missing_ = reply.why;
     }
+    reply.jumps = jumps_;
+    reply.last_jump = last_jump_;
+    if (reply.kind == PoseReply::Kind::valid && begun_ && time < *begun_) {
+      reply.kind = PoseReply::Kind::never;
+      reply.why = "the image is of before a jump of the transforms";
+    }
     return reply;
   }
-  void clear_after(Time /*now*/) override {}
+  void clear_after(Time /*now*/) override {
+    const std::lock_guard lock(mutex_);
+    answered_.clear();
+    begun_.reset();
+  }
   std::string world() override {
-    return options_.world_frame.empty() ? "map" : frame_name(options_.world_frame);
+    return options_.world_frame.empty() ? kNamelessWorld : frame_name(options_.world_frame);
   }
   Diagnosis diagnose(double now) override {
     const std::lock_guard lock(mutex_);
@@ -216,25 +209,71 @@ class TransformPoses : public PoseInput {
       out.level = Diagnosis::error;
       out.message = missing_.empty() ? "no transform was asked for yet: there is no usable image" : missing_;
     }
-    out.values = {{"topic", "/tf"},
-                  {"found", fmt::format("{}", rate_.count())},
-                  {"last_missing", missing_},
-                  {"world_frame", options_.world_frame.empty() ? "map" : options_.world_frame}};
+    out.values = {{"topic", "/tf"},           {"found", fmt::format("{}", rate_.count())},
+                  {"last_missing", missing_}, {"jumps", fmt::format("{}", jumps_)},
+                  {"last_jump", last_jump_},  {"world_frame", world()}};
     return out;
   }
 
  private:
+  /// Whether the transforms lead on to a pose. Between images that are far apart they are asked as well:
+  /// it is not they that paused. The mutex is held.
+  void follow(const Sample& next, const std::string& camera) {
+    if (!answered_.empty() && next.time <= answered_.back().time) return;
+    const double gap = answered_.empty() ? 0 : seconds_between(answered_.back().time, next.time);
+    if (gap > pade::kFarthestPosesApart && gap < kKept) {
+      constexpr double kStep = 0.1;  // s
+      const Stamp begin = answered_.back().time.nanoseconds;
+      const int steps = static_cast<int>(std::ceil(gap / kStep));
+      for (int i = 1; i < steps; ++i) {
+        const Stamp stamp = begin + (next.time.nanoseconds - begin) / steps * i;
+        Placement placement;
+        std::string why;
+        if (transforms_.find(world(), camera, stamp, placement, why) == Transforms::Answer::valid)
+          take({{stamp}, pose_of(placement)});
+      }
+    }
+    take(next);
+  }
+  void take(const Sample& next) {
+    if (const auto found = pade::jump_to(answered_, next.time, next.pose)) {
+      answered_.clear();
+      begun_ = next.time;
+      ++jumps_;
+      last_jump_ = jump_text(*found, "the transforms");
+    }
+    answered_.push_back(next);
+    constexpr double kNeeded = 1;  // s, for a velocity
+    while (seconds_between(answered_.front().time, next.time) > kNeeded) answered_.pop_front();
+  }
+
   NodeOptions options_;
   Transforms& transforms_;
   std::mutex mutex_;
   Rate rate_;
-  std::string missing_;
+  std::string missing_, last_jump_;
+  std::deque<Sample> answered_;
+  std::optional<Time> begun_;  // the newest world
+  std::size_t jumps_ = 0;
 };
 
 }  // namespace
 
 double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::string jump_text(const pade::PoseJump& jump, const std::string& what) {
+  constexpr double kDegrees = 57.29577951308232;
+  switch (jump.kind) {
+    case pade::PoseJump::Kind::place:
+      return fmt::format("{} jumped by {:.2f} m", what, jump.size);
+    case pade::PoseJump::Kind::turn:
+      return fmt::format("{} turned by {:.0f} degrees at once", what, kDegrees * jump.size);
+    case pade::PoseJump::Kind::gap:
+      break;
+  }
+  return fmt::format("{} were silent for {:.1f} s", what, jump.size);
 }
 
 void Rate::tick(double now) {

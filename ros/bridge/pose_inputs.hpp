@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <pade/core/pose.hpp>
+#include <pade/core/sensors/pose_jumps.hpp>
 #include <pade/core/time.hpp>
 
 #include "bridge.hpp"
@@ -26,7 +27,8 @@ struct PoseReply {
   };
   Kind kind = Kind::not_yet;
   pade::Pose T_world_camera;
-  pade::Pose T_world_body;  ///< of the filter
+  pade::Pose T_world_body;  ///< of the filter, of `body_frame`
+  std::string body_frame;   ///< whose pose is to be published; empty: nobody's
   std::string why;          ///< unless valid
   std::size_t jumps = 0;    ///< how often the poses have jumped: before and after do not belong together
   std::string last_jump;    ///< why they did
@@ -68,6 +70,9 @@ inline constexpr double kClockWentBack = 1;  ///< where stamps do by more, s
 
 /// Seconds of a steady clock.
 double steady_seconds();
+
+/// "the poses jumped by 5.00 m"; @param what  "the poses"
+std::string jump_text(const pade::PoseJump& jump, const std::string& what);
 
 /// How often something comes: by the last five seconds.
 class Rate {

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cmath>
+#include <deque>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -19,6 +21,8 @@ using pade::Time;
 using pade::navigation::Answer;
 using pade::navigation::NavigationStatus;
 using pade::navigation::Navigator;
+
+constexpr double kPatience = 5;  // s, until the antenna is taken to be at the IMU
 
 Eigen::Vector3d vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
@@ -45,8 +49,13 @@ class SensorPoses : public PoseInput {
           fmt::format("the stamps of the IMU went back by {:.1f} s", seconds_between(time, newest_imu_)));
     }
     newest_imu_ = time;
-    imu_frame_ = frame_name(message.frame);
-    navigator_.add(pade::ImuSample{time, vector(message.angular_rate), vector(message.specific_force)});
+    imu_frame_ = frame_name(message.frame.empty() ? options_.base_frame : message.frame);
+    const pade::ImuSample sample{time, vector(message.angular_rate), vector(message.specific_force)};
+    if (!origin_) {
+      held_imu_.push_back(sample);
+      while (seconds_between(held_imu_.front().time, time) > 2 * kPatience) held_imu_.pop_front();
+    }
+    navigator_.add(sample);
     if (const std::uint64_t restarts = navigator_.health().restarts; restarts != restarts_) {
       restarts_ = restarts;
       ++jumps_;
@@ -63,21 +72,11 @@ class SensorPoses : public PoseInput {
       ++without_fix_;
       return;
     }
-    if (!origin_) find_lever_arm(message);
-    pade::io::GeodeticFix fix;
-    fix.time = {message.stamp};
-    fix.latitude = message.latitude;
-    fix.longitude = message.longitude;
-    fix.height = message.height;
-    if (message.covariance_kind != 0)
-      fix.covariance = Eigen::Map<const Eigen::Matrix3d>(message.covariance.data());
-    const bool first = !origin_;
-    if (first) origin_ = fix;
-    std::vector<std::string> remarks;
-    const std::array<pade::io::GeodeticFix, 2> pair = {*origin_, fix};
-    const pade::GnssLog log = pade::io::local_log(pair, topics_.fix, remarks);
-    if (first) remarks_ = std::move(remarks);
-    navigator_.add(log.fixes.back());
+    if (origin_) return take(message);
+    held_fixes_.push_back(message);
+    while (seconds_between({held_fixes_.front().stamp}, {message.stamp}) > 2 * kPatience)
+      held_fixes_.pop_front();
+    if (knows_lever_arm(message)) take_held();
   }
 
   void add(const VelocityMessage& message) override {
@@ -159,6 +158,7 @@ class SensorPoses : public PoseInput {
     reply.kind = PoseReply::Kind::valid;
     reply.T_world_body = pose.T_smooth_body;
     reply.T_world_camera = pose.T_smooth_body * *mounting;
+    if (options_.publish_tf) place_body(time, reply);
     return reply;
   }
 
@@ -197,8 +197,10 @@ class SensorPoses : public PoseInput {
       missing(fmt::format("{} comes at {:.0f} Hz, expected 20 Hz and more", topics_.imu, rate));
     } else if (fix_rate_.count() == 0) {
       missing(fmt::format("no sensor_msgs/NavSatFix on {}", topics_.fix));
-    } else if (!origin_) {
+    } else if (!origin_ && held_fixes_.empty()) {
       missing(fmt::format("{} has no fix", topics_.fix));
+    } else if (!origin_) {
+      missing(waits_for_);
     } else if (status == NavigationStatus::lost) {
       missing("the filter is lost");
     } else if (status == NavigationStatus::uninitialised) {
@@ -209,7 +211,14 @@ class SensorPoses : public PoseInput {
       out.level = Diagnosis::warning;
       out.message =
           fmt::format("no sensor_msgs/NavSatFix on {} for {:.0f} s", topics_.fix, fix_rate_.silence(now));
+    } else if (!antenna_remark_.empty()) {
+      out.level = Diagnosis::warning;
+      out.message = antenna_remark_;
+    } else if (!body_remark_.empty()) {
+      out.level = Diagnosis::warning;
+      out.message = fmt::format("transform {}", body_remark_);
     }
+    const Eigen::Vector3d& arm = navigator_options_.gnss_lever_arm;
     out.values = {{"imu_topic", topics_.imu},
                   {"imu_hz", fmt::format("{:.1f}", imu_rate_.hertz(now))},
                   {"imu_received", fmt::format("{}", imu_rate_.count())},
@@ -220,10 +229,13 @@ class SensorPoses : public PoseInput {
                   {"velocities", fmt::format("{}", velocities_)},
                   {"fields", fmt::format("{}", fields_)},
                   {"heights", fmt::format("{}", heights_)},
+                  {"lever_arm", fmt::format("{:.3f} {:.3f} {:.3f}", arm.x(), arm.y(), arm.z())},
                   {"status", std::string(pade::to_name(status))},
                   {"jumps", fmt::format("{}", jumps_)},
                   {"last_jump", last_jump_}};
     if (!field_remark_.empty()) out.values.emplace_back("magnetic_field", field_remark_);
+    if (!body_remark_.empty()) out.values.emplace_back("transform", body_remark_);
+    if (!antenna_remark_.empty()) out.values.emplace_back("antenna", antenna_remark_);
     for (const std::string& remark : remarks_) out.values.emplace_back("remark", remark);
     return out;
   }
@@ -232,27 +244,95 @@ class SensorPoses : public PoseInput {
   void begin_anew(std::string why) {
     navigator_ = Navigator(navigator_options_);
     origin_.reset();
+    held_imu_.clear();
+    held_fixes_.clear();
+    antenna_remark_.clear();
+    asked_since_.reset();
     newest_imu_ = {};
     restarts_ = 0;
     ++jumps_;
     last_jump_ = std::move(why);
   }
 
-  /// Where the antenna sits, if a transform says so and the parameters do not.
-  void find_lever_arm(const FixMessage& message) {
+  /// Whether it is known where the antenna sits, or will not be: nothing is measured before, since what was
+  /// measured with another place of it cannot be taken back.
+  bool knows_lever_arm(const FixMessage& message) {
+    if (!options_.navigator.gnss_lever_arm.isZero(0)) return true;  // the parameters say so
+    if (imu_frame_.empty()) {
+      waits_for_ = "no message of the IMU has come";
+      return false;
+    }
     const std::string frame = frame_name(message.frame);
-    if (frame.empty() || imu_frame_.empty() || frame == imu_frame_) return;
-    if (!options_.navigator.gnss_lever_arm.isZero(0)) return;
+    std::string why = "the fixes name no frame";
+    if (frame == imu_frame_) return true;
+    if (!frame.empty()) {
+      Placement placement;
+      if (transforms_.find(imu_frame_, frame, message.stamp, placement, why) == Transforms::Answer::valid) {
+        const Eigen::Vector3d arm = vector(placement.position);
+        placed_anew_ = arm != navigator_options_.gnss_lever_arm;
+        navigator_options_.gnss_lever_arm = arm;
+        return true;
+      }
+      if (!asked_since_) asked_since_ = Time{message.stamp};
+      if (seconds_between(*asked_since_, {message.stamp}) < kPatience) {
+        waits_for_ = fmt::format("where the antenna sits on {} is not known yet: {}", imu_frame_, why);
+        return false;
+      }
+    }
+    antenna_remark_ = fmt::format("the antenna is taken to be at the IMU: {}", why);
+    return true;
+  }
+
+  /// What came meanwhile, in its order.
+  void take_held() {
+    waits_for_.clear();
+    asked_since_.reset();
+    const auto fixes = std::exchange(held_fixes_, {});
+    const auto samples = std::exchange(held_imu_, {});
+    if (fixes.size() == 1 && !placed_anew_) return take(fixes.front());
+    placed_anew_ = false;
+    navigator_ = Navigator(navigator_options_);
+    restarts_ = 0;
+    auto fix = fixes.begin();
+    for (const pade::ImuSample& sample : samples) {
+      for (; fix != fixes.end() && fix->stamp < sample.time.nanoseconds; ++fix) take(*fix);
+      navigator_.add(sample);
+    }
+    for (; fix != fixes.end(); ++fix) take(*fix);
+  }
+
+  void take(const FixMessage& message) {
+    pade::io::GeodeticFix fix;
+    fix.time = {message.stamp};
+    fix.latitude = message.latitude;
+    fix.longitude = message.longitude;
+    fix.height = message.height;
+    if (message.covariance_kind != 0)
+      fix.covariance = Eigen::Map<const Eigen::Matrix3d>(message.covariance.data());
+    const bool first = !origin_;
+    if (first) origin_ = fix;
+    std::vector<std::string> remarks;
+    const std::array<pade::io::GeodeticFix, 2> pair = {*origin_, fix};
+    const pade::GnssLog log = pade::io::local_log(pair, topics_.fix, remarks);
+    if (first) remarks_ = std::move(remarks);
+    navigator_.add(log.fixes.back());
+  }
+
+  /// The transform that is published is that of the vehicle, wherever the IMU sits on it.
+  void place_body(Time time, PoseReply& reply) {
+    const std::string body = frame_name(options_.base_frame);
+    body_remark_.clear();
+    reply.body_frame = body;
+    if (body == imu_frame_) return;
     Placement placement;
     std::string why;
-    if (transforms_.find(imu_frame_, frame, message.stamp, placement, why) != Transforms::Answer::valid) {
-      remarks_.push_back(fmt::format("the antenna is taken to be at the IMU: {}", why));
+    if (transforms_.find(imu_frame_, body, time.nanoseconds, placement, why) == Transforms::Answer::valid) {
+      reply.T_world_body = reply.T_world_body * pose_of(placement);
       return;
     }
-    const Eigen::Vector3d arm = vector(placement.position);
-    if (arm == navigator_options_.gnss_lever_arm) return;
-    navigator_options_.gnss_lever_arm = arm;
-    navigator_ = Navigator(navigator_options_);  // nothing has been measured yet but the IMU
+    reply.body_frame.clear();
+    body_remark_ =
+        fmt::format("not published, since it is not known how {} sits on {}: {}", body, imu_frame_, why);
   }
 
   NodeOptions options_;
@@ -263,7 +343,11 @@ class SensorPoses : public PoseInput {
   std::mutex mutex_;
   Navigator navigator_;
   Pose T_body_camera_;
-  std::string imu_frame_, last_jump_, field_remark_;
+  std::string imu_frame_, last_jump_, field_remark_, body_remark_, antenna_remark_, waits_for_;
+  std::deque<pade::ImuSample> held_imu_;  // until there is an origin
+  std::deque<FixMessage> held_fixes_;
+  std::optional<Time> asked_since_;  // where the antenna sits
+  bool placed_anew_ = false;         // it sits elsewhere than the navigator believes
   std::optional<pade::io::GeodeticFix> origin_;
   Time newest_imu_{};
   Rate imu_rate_, fix_rate_;

@@ -1,12 +1,14 @@
 // `pade flow` and `pade flow evaluate` as a user meets them.
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
+
+#include "pade/io/image/image_codec.hpp"
 
 #include "apps/run_program.hpp"
 #include "support/temporary_folder.hpp"
@@ -65,7 +67,7 @@ TEST(FlowCommand, SaysThatAMethodHasNoSigmaRatherThanThatItIsPerfect) {
 TEST(FlowCommand, RefusesAPictureThatCannotBeWrittenBeforeItWritesAnything) {
   const test::TemporaryFolder folder;
   const std::string image = (folder.path() / "one.png").string();
-  ASSERT_TRUE(cv::imwrite(image, cv::Mat(48, 64, CV_8UC1, cv::Scalar(9))));
+  ASSERT_TRUE(io::save_image(image, cv::Mat(48, 64, CV_8UC1, cv::Scalar(9))));
   const std::string out = (folder.path() / "out.flo").string();
   const std::string command = kPade + " flow " + image + " " + image + " --flow clg-fast --out " + out;
   for (const char* name : {"x.xyz", "x", ".png.txt"}) {
@@ -76,6 +78,22 @@ TEST(FlowCommand, RefusesAPictureThatCannotBeWrittenBeforeItWritesAnything) {
   }
   EXPECT_THAT(shell(command + " --full-scale 3").text, HasSubstr("--full-scale: found it without --picture"));
   EXPECT_EQ(shell(command + " --full-scale 3 --picture " + (folder.path() / "x.png").string()).code, 0);
+}
+
+TEST(FlowCommand, NamesThePackageThatAnImageOfAnotherFormatNeeds) {
+#ifdef PADE_SANITIZED
+  GTEST_SKIP() << "sanitized programs look into their own run path first";
+#endif
+  const test::TemporaryFolder folder;
+  const std::string image = (folder.path() / "one.bmp").string();
+  std::ofstream(image) << "BM, and no more";
+  std::ofstream(folder.path() / "libpade_image_formats.so").flush();  // found first, and no module
+  const Outcome outcome =
+      shell("LD_LIBRARY_PATH=" + folder.path().string() + " " + kPade + " flow " + image + " " + image);
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.text,
+              testing::AllOf(HasSubstr("one.bmp: "), HasSubstr("BMP"), HasSubstr("pade-image-formats"),
+                             HasSubstr("libopencv-imgcodecs-dev")));
 }
 
 TEST(FlowCommand, SaysWhatAFolderToEvaluateMustHold) {
@@ -90,7 +108,7 @@ TEST(FlowCommand, RefusesImagesInWhichTheMethodFindsNothing) {
   const test::TemporaryFolder folder;
   const std::string image = (folder.path() / "one.png").string();
   const std::string out = (folder.path() / "out.flo").string();
-  ASSERT_TRUE(cv::imwrite(image, cv::Mat(1, 1, CV_8UC1, cv::Scalar(9))));
+  ASSERT_TRUE(io::save_image(image, cv::Mat(1, 1, CV_8UC1, cv::Scalar(9))));
   const Outcome dis = shell(kPade + " flow " + image + " " + image + " --flow dis-medium --out " + out);
   EXPECT_EQ(dis.code, 1);
   EXPECT_THAT(dis.text, HasSubstr("images of 1 x 1 pixels"));

@@ -8,9 +8,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/checks/scene_hardness.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/simulation/analytic/analytic_flights.hpp"
@@ -45,12 +45,13 @@ std::vector<io::StampedPose> write_images(const fs::path& folder, int frames, do
     const Pose pose = flight->T_world_camera.front() * step;
     poses.push_back({Time{100'000'000LL * (i + 1)}, pose});
     const std::string name = to_string(poses.back().time) + ".png";
-    cv::imwrite((folder / "rgb" / name).string(), simulation::render_image(flight->scene, c, pose));
+    EXPECT_TRUE(
+        io::save_image((folder / "rgb" / name).string(), simulation::render_image(flight->scene, c, pose)));
     if (!with_depth) continue;
     cv::Mat depth = simulation::exact_depth(flight->scene, c, pose);
     cv::patchNaNs(depth);
     depth.convertTo(depth, CV_16U, 1000);
-    cv::imwrite((folder / "depth" / name).string(), depth);
+    EXPECT_TRUE(io::save_image((folder / "depth" / name).string(), depth));
   }
   std::ofstream(folder / "camera.yaml")
       << "width: " << c.width << "\nheight: " << c.height << "\nfx: " << c.fx << "\nfy: " << c.fy
@@ -92,8 +93,8 @@ TEST(SequenceCheck, SaysHowMuchTrueDepthCannotBeUsed) {
   const auto poses = write_images(folder.path(), 6, 1, true);
   std::ofstream(folder / "groundtruth.txt") << io::format_trajectory(poses);
   const auto damage = [&](std::size_t i) {
-    cv::imwrite((folder.path() / "depth" / (to_string(poses[i].time) + ".png")).string(),
-                cv::Mat(90, 120, CV_16UC1, cv::Scalar(1000)));
+    EXPECT_TRUE(io::save_image((folder.path() / "depth" / (to_string(poses[i].time) + ".png")).string(),
+                               cv::Mat(90, 120, CV_16UC1, cv::Scalar(1000))));
   };
   for (const std::size_t i : {1, 3}) damage(i);
   const auto sequence = io::Sequence::open(folder.path());

@@ -1,7 +1,11 @@
 #include "pade/depth/image/outlines.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -13,6 +17,7 @@ namespace {
 constexpr int kWidth = 90;
 constexpr int kHeight = 70;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr auto kMeasured = static_cast<std::uint8_t>(DepthState::measured);
 constexpr auto kNoTexture = static_cast<std::uint8_t>(DepthState::no_texture);
 
@@ -108,6 +113,73 @@ TEST(Outlines, WithTextureEverywhereNothingChanges) {
   const cv::Mat before = image.bound.clone();
   bound_by_outlines(image);
   EXPECT_EQ(cv::countNonZero(before != image.bound), 0);
+}
+
+/// What the ray from an open pixel in a direction meets: inverse bound (infinity = unknown) and steps;
+/// negative: the border.
+std::pair<float, float> met(const DepthImage& image, int u, int v, int du, int dv) {
+  for (int steps = 1;; ++steps) {
+    const cv::Point at(u + steps * du, v + steps * dv);
+    if (at.x < 0 || at.y < 0 || at.x >= image.bound.cols || at.y >= image.bound.rows) return {-1, steps};
+    if (image.state.at<std::uint8_t>(at) == kNoTexture) continue;
+    const float bound = image.bound.at<float>(at);
+    return {bound > 0 ? 1 / bound : kInfinity, steps};
+  }
+}
+
+/// The inverse bound of an open pixel by its eight rays; infinity = none.
+float by_rays(const DepthImage& image, int u, int v) {
+  const cv::Point directions[] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
+  std::vector<float> lines;
+  float greatest = 0;
+  int rays = 0;
+  for (const cv::Point d : directions) {
+    const auto [a, a_steps] = met(image, u, v, -d.x, -d.y);
+    const auto [b, b_steps] = met(image, u, v, d.x, d.y);
+    const bool known = a >= 0 && a < kInfinity && b >= 0 && b < kInfinity;
+    lines.push_back(known ? (a * b_steps + b * a_steps) / (a_steps + b_steps) : kInfinity);
+    for (const float rho : {a, b}) {
+      if (rho < 0) continue;
+      ++rays;
+      greatest = std::max(greatest, rho);
+    }
+  }
+  std::sort(lines.begin(), lines.end());
+  if (lines[1] < kInfinity) return lines[1];
+  return rays >= 5 ? greatest : kInfinity;
+}
+
+/// To the last bit, whatever the width leaves over of a vector.
+TEST(Outlines, EveryPixelHasWhatItsRaysMeet) {
+  Random random(11);
+  for (const int width : {1, 7, 33, 70}) {
+    DepthImage image;
+    image.bound = cv::Mat(40, width, CV_32FC1);
+    image.state = cv::Mat(40, width, CV_8UC1);
+    const double share = random.uniform(0.2, 0.95);
+    for (int v = 0; v < image.bound.rows; ++v) {
+      for (int u = 0; u < width; ++u) {
+        image.state.at<std::uint8_t>(v, u) = random.uniform() < share ? kNoTexture : kMeasured;
+        const auto bound = static_cast<float>(random.uniform(0.5, 30));
+        image.bound.at<float>(v, u) = random.uniform() < 0.3 ? kNan : bound;
+      }
+    }
+    cv::Mat expected = image.bound.clone();
+    for (int v = 0; v < image.bound.rows; ++v) {
+      for (int u = 0; u < width; ++u) {
+        if (image.state.at<std::uint8_t>(v, u) != kNoTexture) continue;
+        const float rho = by_rays(image, u, v);
+        auto& bound = expected.at<float>(v, u);
+        if (rho < kInfinity && !(bound * rho >= 1)) bound = 1 / rho;
+      }
+    }
+    bound_by_outlines(image);
+    for (int v = 0; v < image.bound.rows; ++v) {
+      EXPECT_EQ(
+          std::memcmp(image.bound.ptr(v), expected.ptr(v), sizeof(float) * static_cast<std::size_t>(width)),
+          0);
+    }
+  }
 }
 
 }  // namespace

@@ -1,9 +1,15 @@
 #include "pade/depth/multi_view/views_depth.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "pade/core/random.hpp"
 
 #include "depth/depth_scene.hpp"
 
@@ -201,6 +207,121 @@ TEST(ViewsDepth, APairWithoutParallaxDoesNotGainsayWhatWasFound) {
     EXPECT_GT(right(), 0.8) << step;
     two_view.depth.setTo(3.5);  // measured, and far from what was found
     EXPECT_LT(right(), 0.2) << step;
+  }
+}
+
+/// read_views() pixel by pixel, but for what the bounds around do to a bound.
+void read_pixel(const ParallaxField& field, int u, int v, const CommonError& common, DepthImage& image,
+                cv::Mat& of_views) {
+  const DepthOptions depth;
+  const ViewsDepthOptions options;
+  const auto range = static_cast<float>(depth.range);
+  const auto at = [&](const cv::Mat& plane) { return plane.at<float>(v, u); };
+  auto& state = image.state.at<std::uint8_t>(v, u);
+  auto& bound = image.bound.at<float>(v, u);
+  const auto drop = [&](DepthState why) {
+    for (cv::Mat* plane : {&image.depth, &image.variance, &image.own_variance}) plane->at<float>(v, u) = kNan;
+    state = code(why);
+  };
+  for (const DepthState blind : {DepthState::inconsistent, DepthState::out_of_view, DepthState::no_texture}) {
+    if (state == code(blind)) return;
+  }
+  if (!(at(field.information) > 0) || !(at(field.texture) > 1.6F)) {
+    if (at(field.matching) > 0) drop(DepthState::no_texture);
+    return;
+  }
+  const float d = at(field.distance);
+  const float n = at(field.matching);
+  const float contradiction = n > 1 ? std::max(1.0F, at(field.spread) / (n - 1)) : 1.0F;
+  const auto scale2 = static_cast<float>(options.sigma_scale * options.sigma_scale);
+  const auto relative2 = static_cast<float>(options.relative_sigma * options.relative_sigma);
+  const float offset = at(field.offset);
+  const float sigma2 = scale2 * contradiction / at(field.information) + relative2 * d * d + offset * offset;
+  const auto gate2 = static_cast<float>(depth.parallax_gate * depth.parallax_gate);
+  const auto scale = static_cast<float>(kScale);
+  const bool measured = d > 0 && sigma2 * gate2 < d * d && scale <= range * d;
+  if (!measured && !(at(field.texture) > 2.4F)) return drop(DepthState::no_texture);
+  const float rho = std::max(d, 0.0F) * static_cast<float>(1 / kScale);
+  const float shared = static_cast<float>(kScale * kScale) * common(u, v, rho);
+  const float found =
+      scale / (std::max(d, 0.0F) + static_cast<float>(depth.bound_sigmas) * std::sqrt(sigma2 + shared));
+  of_views.at<float>(v, u) = found;
+  if (!(bound >= found)) bound = found;
+  if (measured) {
+    const float z = scale / d;
+    const float e2 = sigma2 / (d * d);
+    const float own = z * z * e2 * (1 + e2 * (18 + 400 * e2));
+    image.depth.at<float>(v, u) = z;
+    image.own_variance.at<float>(v, u) = own;
+    image.variance.at<float>(v, u) = own + z * z * shared / (d * d);
+    state = code(DepthState::measured);
+    return;
+  }
+  if (state == code(DepthState::epipole)) return;
+  const bool vague = sigma2 > 0.25F;
+  if (state == code(DepthState::measured) || vague)
+    drop(vague ? DepthState::no_texture : DepthState::low_parallax);
+  if (state == code(DepthState::low_parallax) && bound >= range) state = code(DepthState::far);
+}
+
+/// To the last bit, whatever the width leaves over of a vector.
+TEST(ViewsDepth, EveryPixelIsReadAsOneByItself) {
+  Random random(5);
+  const Camera camera = [] {
+    Camera c;
+    c.width = 45;
+    c.height = 31;
+    c.fx = c.fy = 40;
+    c.cx = 22;
+    c.cy = 15;
+    return c;
+  }();
+  std::vector<RelativeMotion> motions(3);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    motions[i].t_reference_other = Eigen::Vector3d(0.3, 0.1, -0.4) * static_cast<double>(i + 1);
+    motions[i].covariance = 1e-5 * static_cast<double>(i + 1) * Matrix6d::Identity();
+  }
+  for (const bool exact : {false, true}) {
+    const CommonError common = exact ? CommonError() : CommonError(camera, motions, 8);
+    const auto some = [&](double low, double high, double none) {
+      cv::Mat plane(camera.size(), CV_32FC1);
+      for (auto& value : cv::Mat_<float>(plane)) {
+        value = random.uniform() < none ? 0.0F : static_cast<float>(random.uniform(low, high));
+      }
+      return plane;
+    };
+    const ParallaxField field = {some(-20, 300, 0.1), some(0, 3, 0.2), some(0, 9, 0.2),
+                                 some(-1, 1, 0.5),    some(0, 4, 0.2), some(0, 5, 0.1)};
+    DepthImage image;
+    image.depth = some(1, 20, 0);
+    image.variance = some(0, 1, 0);
+    image.own_variance = some(0, 1, 0);
+    image.bound = some(1, 40, 0);
+    image.bound.setTo(kNan, image.bound > 30);
+    image.state = cv::Mat(camera.size(), CV_8UC1);
+    for (auto& value : cv::Mat_<std::uint8_t>(image.state))
+      value = static_cast<std::uint8_t>(random.uniform(0, 7));
+    DepthImage expected = image;
+    for (cv::Mat* plane :
+         {&expected.depth, &expected.variance, &expected.own_variance, &expected.bound, &expected.state}) {
+      *plane = plane->clone();
+    }
+    cv::Mat of_views(camera.size(), CV_32FC1, cv::Scalar(std::numeric_limits<float>::infinity()));
+    for (int v = 0; v < camera.height; ++v) {
+      for (int u = 0; u < camera.width; ++u) read_pixel(field, u, v, common, expected, of_views);
+    }
+    cv::Mat least;
+    cv::erode(of_views, least, cv::Mat::ones(5, 5, CV_8UC1));
+    least.copyTo(expected.bound, expected.bound > least);
+    read_views(field, kScale, common, {}, {}, image);
+    const auto same = [](const cv::Mat& a, const cv::Mat& b) {
+      return std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
+    };
+    EXPECT_TRUE(same(image.depth, expected.depth));
+    EXPECT_TRUE(same(image.variance, expected.variance));
+    EXPECT_TRUE(same(image.own_variance, expected.own_variance));
+    EXPECT_TRUE(same(image.bound, expected.bound));
+    EXPECT_TRUE(same(image.state, expected.state));
   }
 }
 

@@ -13,11 +13,11 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "pade/io/formats/map_files.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/text.hpp"
 
 #include "apps/run_program.hpp"
@@ -48,7 +48,7 @@ class LiveCommand : public testing::Test {
     std::ofstream list(folder_ / "flight" / "rgb.txt");
     for (int i = 0; i < frames; ++i) {
       const std::string name = fmt::format("rgb/{:04d}.png", i);
-      ASSERT_TRUE(cv::imwrite((folder_ / "flight" / name).string(), image_of_wall(wall, i / kRate)));
+      ASSERT_TRUE(io::save_image((folder_ / "flight" / name).string(), image_of_wall(wall, i / kRate)));
       list << fmt::format("{:.6f} {}\n", 100 + i / kRate, name);
     }
     std::ofstream(folder_ / "flight" / "camera.yaml")

@@ -260,6 +260,7 @@ TEST(Session, FarFromTheOriginOfThePosesTheMapHasOneOfItsOwn) {
   EXPECT_EQ(counts.outside, 0U);
   EXPECT_NEAR(bed.session->origin().y(), -40'000, 1);
   EXPECT_NEAR(bed.session->origin().z(), 120, 1);
+  EXPECT_EQ(bed.gatherer.last.origin, bed.session->origin()) << "whoever shows the map has to know";
   EXPECT_GT(bed.session->map().counts().occupied, 50U);
   ASSERT_FALSE(bed.gatherer.ages.empty());
   const LiveUpdate& last = bed.gatherer.last;
@@ -280,6 +281,17 @@ TEST(Session, NearTheBorderOfAMapAnotherIsBegun) {
   EXPECT_NEAR(bed.session->origin().x(), bed.poses.start.x() + 0.8 * kSpeed, 0.3);
   EXPECT_NEAR(bed.session->origin().y(), 5, 1e-6);
   EXPECT_LT(bed.gatherer.last.T_world_body.translation.norm(), 2);
+}
+
+/// A recording that is played at half its pace falls behind our clock, and is mapped nevertheless.
+TEST(Session, FramesOfARecordingThatFallsBehindAreMapped) {
+  Bed bed(10);
+  bed.camera.lag = 20;
+  const auto& counts = bed.run(1.6, [](double) {});
+  expect_all_counted(counts, bed.camera.delivered);
+  EXPECT_GT(counts.mapped * 10, counts.frames * 7);
+  EXPECT_LT(seconds_between(Time{bed.progress.depth}, now_of_ours()), 10) << "the depth is not stale";
+  EXPECT_LT(seconds_between(Time{bed.progress.image}, now_of_ours()), 10) << "nor is the camera";
 }
 
 /// An autopilot that starts anew on the ground and then has no pose leaves the flight's map as it is.

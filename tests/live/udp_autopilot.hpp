@@ -48,6 +48,14 @@ class UdpAutopilot {
     const std::lock_guard lock(mutex_);
     return sectors_;
   }
+  struct SentPose {
+    Time stamp;  // by our clock
+    Time sent;
+  };
+  [[nodiscard]] std::vector<SentPose> poses() const {
+    const std::lock_guard lock(mutex_);
+    return poses_;
+  }
   [[nodiscard]] std::vector<std::string> texts() const {
     const std::lock_guard lock(mutex_);
     return texts_;
@@ -78,6 +86,10 @@ class UdpAutopilot {
   void tell_pose() {
     const auto boot = static_cast<std::uint32_t>(clock() / 1'000'000);
     const Time ours{static_cast<std::int64_t>(boot) * 1'000'000 + 500'000'000'000};
+    {
+      const std::lock_guard lock(mutex_);
+      poses_.push_back({ours, now_of_ours()});
+    }
     if (flight_) return tell_flight(boot, ours);
     tell(mavlink::AttitudeQuaternion{boot, 1, 0, 0, 0, 0, 0, 0, {}});
     const auto east = static_cast<float>(kSpeed * seconds_between(zero_, ours));
@@ -125,6 +137,7 @@ class UdpAutopilot {
   mavlink::Parser parser_;
   mutable std::mutex mutex_;
   std::vector<Heard> sectors_;
+  std::vector<SentPose> poses_;
   std::vector<std::string> texts_;
   std::atomic<bool> over_{false};
   std::thread thread_;  // last: it uses all of the above

@@ -57,13 +57,16 @@ class WallCamera : public FrameSource {
     ++count_;
     frame.time = now_of_ours();
     frame.image = image_of_wall(wall_, seconds_between(zero, frame.time));
+    frame.time.nanoseconds -= static_cast<std::int64_t>(lag * 1e9);
     ++delivered;
     return Outcome::frame;
   }
   [[nodiscard]] const Camera& camera() const override { return camera_; }
   [[nodiscard]] cv::Mat mask() const override { return {}; }
+  [[nodiscard]] double behind() const override { return lag; }
 
   std::atomic<bool> stalled{false};
+  std::atomic<double> lag{0};  ///< of its times behind ours, s
   std::atomic<std::size_t> delivered{0};
   Time zero = now_of_ours();
 

@@ -43,6 +43,21 @@ void cut_after(const fs::path& file, double last) {
   }
 }
 
+/// A table with all stamps later by `shift`, s.
+void write_later(const fs::path& from, const fs::path& to, double shift) {
+  std::istringstream rows(text_of(from));
+  std::ofstream out(to);
+  for (std::string row; std::getline(rows, row);) {
+    const bool is_number = !row.empty() && std::isdigit(static_cast<unsigned char>(row[0])) != 0;
+    if (is_number) {
+      char stamp[32];
+      std::snprintf(stamp, sizeof stamp, "%.6f", std::stod(row) + shift);
+      row = stamp + row.substr(row.find(','));
+    }
+    out << row << '\n';
+  }
+}
+
 /// One flight for all tests: along a wall with things in front of it, 12 s.
 class MapFromSensors : public testing::Test {
  protected:
@@ -318,6 +333,84 @@ TEST_F(MapFromSensors, NamesWhatIsMissing) {
   cut_after(silent / "mag.csv", -1);
   EXPECT_THAT(refusal(silent),
               testing::AnyOf(HasSubstr("never knew its yaw"), HasSubstr("no rows"), HasSubstr("no row")));
+}
+
+TEST_F(MapFromSensors, SensorsOfAnotherPlaceAndClockGiveTheSamePoses) {
+  constexpr double kShift = 1000.25;
+  const fs::path images = copy("images"), log = root_ / "autopilot";
+  fs::create_directories(log);
+  for (const char* file : {"imu.csv", "gnss.csv", "baro.csv", "mag.csv"}) {
+    write_later(flown() / file, log / file, kShift);
+    fs::remove(images / file);
+  }
+  MapSequenceOptions apart = options(poses_from_sensors);
+  apart.log = log.string();
+  const auto refusal = [&] {
+    const auto sequence = open_sequence(images, apart);
+    return sequence ? std::string("accepted") : sequence.error().message;
+  };
+  apart.time_offset = "1000.25";
+  const auto together = open(flown());
+  ASSERT_TRUE(together);
+  const auto sequence = open_sequence(images, apart);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  ASSERT_EQ(sequence->size(), together->size());
+  for (std::size_t i = 0; i < sequence->size(); ++i) {
+    ASSERT_EQ(sequence->pose(i).translation, together->pose(i).translation) << i;
+    ASSERT_EQ(sequence->pose(i).rotation.coeffs(), together->pose(i).rotation.coeffs()) << i;
+  }
+  EXPECT_THAT(sequence->notes(), testing::Contains(HasSubstr("image + 1000.250000 s, as was given")));
+  EXPECT_THAT(sequence->notes(), testing::Contains(HasSubstr("the sensors are those of " + log.string())));
+
+  apart.time_offset = "";  // camera.yaml says 0
+  EXPECT_THAT(refusal(), HasSubstr("pade calibrate time finds the offset"));
+  apart.time_offset = "soon";
+  EXPECT_THAT(refusal(), HasSubstr("--time-offset: found \"soon\", expected seconds or auto"));
+  std::string calibration = text_of(images / "camera.yaml");
+  const auto at = calibration.find("time_offset_s");
+  ASSERT_NE(at, std::string::npos);
+  std::ofstream(images / "camera.yaml") << calibration.erase(at, calibration.find('\n', at) + 1 - at);
+  apart.time_offset = "";
+  EXPECT_THAT(refusal(), HasSubstr("how its clock relates to that of the images is not said"));
+  apart.time_offset = "0.5";
+  EXPECT_THAT(refusal(), HasSubstr("expected some of the"));
+  apart.sequence.poses = "groundtruth";
+  EXPECT_THAT(refusal(), HasSubstr("--log: found"));
+}
+
+TEST_F(MapFromSensors, TheOffsetIsFoundOrRefused) {
+  constexpr double kShift = -3.125;
+  const fs::path images = copy("unknown_clock");
+  write_later(flown() / "imu.csv", images / "imu.csv", 100 + kShift);
+  for (const char* file : {"gnss.csv", "baro.csv", "mag.csv"})
+    write_later(flown() / file, images / file, 100 + kShift);
+  MapSequenceOptions searched = options(poses_from_sensors);
+  searched.time_offset = "auto";
+  const auto sequence = open_sequence(images, searched);
+  if (sequence) {
+    std::string note;
+    for (const std::string& one : sequence->notes())
+      if (one.find("time of a pose") == 0) note = one;
+    std::printf("%s\n", note.c_str());
+    double offset = 0;
+    ASSERT_EQ(std::sscanf(note.c_str(), "time of a pose = time of the image + %lf s", &offset), 1);
+    ASSERT_NE(note.find("1 sigma "), std::string::npos);
+    const double sigma = 1e-3 * std::stod(note.substr(note.find("1 sigma ") + 8));
+    EXPECT_LT(std::abs(offset - 100 - kShift), 5 * sigma);
+    EXPECT_LT(sigma, 0.02);
+  } else {  // seven seconds of small images with few turns may be too little, and then it says so
+    EXPECT_THAT(sequence.error().message, HasSubstr("fit nearly alike"));
+  }
+
+  // The IMU of a vehicle that stands.
+  std::ofstream imu(images / "imu.csv");
+  imu << "# frame=FLU\nt_s,gx,gy,gz,ax,ay,az\n";
+  for (int i = 0; i < 4000; ++i) imu << 100 + 0.005 * i << ",0,0," << 1e-5 * (i % 3) << ",0,0,9.81\n";
+  imu.close();
+  const auto refused = open_sequence(images, searched);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("expected"));
+  EXPECT_THAT(refused.error().message, HasSubstr("the IMU at 0.0 deg/s"));
 }
 
 }  // namespace

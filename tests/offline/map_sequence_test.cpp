@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/simulation/analytic/analytic_flights.hpp"
@@ -35,11 +35,12 @@ class MapSequence : public testing::Test {
     for (std::size_t k = 0; k < flight.times.size(); ++k) {
       const std::string name = to_string(flight.times[k]) + ".png";
       const Pose& pose = flight.T_world_camera[k];
-      cv::imwrite(sequence() / "rgb" / name, simulation::render_image(flight.scene, flight.camera, pose));
+      EXPECT_TRUE(io::save_image(sequence() / "rgb" / name,
+                                 simulation::render_image(flight.scene, flight.camera, pose)));
       cv::Mat depth = simulation::exact_depth(flight.scene, flight.camera, pose);
       cv::patchNaNs(depth);
       depth.convertTo(depth, CV_16U, 1000);
-      cv::imwrite(sequence() / "depth" / name, depth);
+      EXPECT_TRUE(io::save_image(sequence() / "depth" / name, depth));
       poses.push_back({flight.times[k], pose});
     }
     std::ofstream(sequence() / "groundtruth.txt") << io::format_trajectory(poses);
@@ -175,7 +176,7 @@ TEST_F(MapSequence, TrueDepthThatCannotBeUsedIsNamedAndCounted) {
   const auto file = [&](int i) { return sequence() / "depth" / fmt::format("0.{}00000.png", i); };
   const auto damage = [&](int i) { fs::resize_file(file(i), 300); };
   const auto shrink = [&](int i) {
-    cv::imwrite(file(i).string(), cv::Mat(60, 80, CV_16UC1, cv::Scalar(900)));
+    EXPECT_TRUE(io::save_image(file(i).string(), cv::Mat(60, 80, CV_16UC1, cv::Scalar(900))));
   };
   MapSequenceOptions strict;
   strict.sequence.strict = true;

@@ -82,6 +82,7 @@ class Tight : public testing::Test {
     options.pseudorange_sigma = 0.5;
     options.doppler_sigma = 0.04;
     options.phase_sigma = 0.0016;
+    options.estimate_doppler_sigma = options.estimate_phase_sigma = false;
     return options;
   }
 

@@ -6,8 +6,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/run/run_writer.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
 
@@ -34,14 +34,14 @@ void write_sequence(const fs::path& folder, bool with_truth) {
     const std::string name = to_string(Time::from_seconds(i));
     cv::Mat image(kSize, CV_8UC1);
     cv::randu(image, 1, 255);
-    cv::imwrite((folder / "rgb" / (name + ".png")).string(), image);
+    EXPECT_TRUE(io::save_image((folder / "rgb" / (name + ".png")).string(), image));
     poses << name << " " << 0.1 * i << " 0 0 0 0 0 1\n";
     if (!with_truth) continue;
     fs::create_directories(folder / "depth");
     cv::Mat millimetres = test::truth_ramp(kSize);
     cv::patchNaNs(millimetres, 0);
     millimetres.convertTo(millimetres, CV_16UC1, 1000);
-    cv::imwrite((folder / "depth" / (name + ".png")).string(), millimetres);
+    EXPECT_TRUE(io::save_image((folder / "depth" / (name + ".png")).string(), millimetres));
   }
 }
 

@@ -16,6 +16,7 @@
 #include "pade/report/plot/route_picture.hpp"
 #include "pade/report/report_pictures.hpp"
 #include "pade/report/report_text.hpp"
+#include "pade/report/view_3d/view_3d.hpp"
 
 namespace pade::cli {
 namespace {
@@ -133,6 +134,19 @@ std::string page(const std::string& title, const std::string& body) {
                      evaluation::begin_page(title, ".map svg { width: 100%; height: auto; }"), body);
 }
 
+/// The map and the way that one can turn, in the world of the map.
+std::string view_of_flight(const mapping::MapView& map, const std::vector<Vector3d>& points,
+                           const std::array<Vector3d, 2>& corners) {
+  evaluation::View3d view;
+  view.leaves = [&map](const auto& visitor) { map.for_each_leaf(visitor); };
+  view.voxel = map.voxel();
+  view.way = points;
+  view.plan = {corners.begin(), corners.end()};
+  view.plan_name = "straight to the goal";
+  view.is_enu = true;
+  return evaluation::view_3d(view);
+}
+
 std::string flight_page(const ordered_json& whole, const FlightTask& task, const ChainRecord& record,
                         const FlightStrip& strip) {
   const ordered_json& f = whole["flight"];
@@ -161,13 +175,15 @@ std::string flight_page(const ordered_json& whole, const FlightTask& task, const
         evaluation::route_picture(*record.view, points, corners,
                                   whole["made_of"]["options"]["planner"]["vehicle"]["radius"].get<double>(),
                                   (flight.duration - record.climbed) / kFasterBy);
-    body += "</div>\n";
+    body += "</div>\n" + view_of_flight(*record.view, points, corners);
   }
   body += "<h2>Over time</h2>\n<div class=\"views\">";
   body += plot_of(flight, "true clearance, at most 2 m", "[m]",
                   [](const FlightSample& s) { return s.clearance; });
   body += plot_of(flight, "speed", "[m/s]", [](const FlightSample& s) { return s.state.velocity.norm(); });
   body += "</div>\n<h2>What the camera saw</h2>\n" + strip.html();
+  if (record.view && !points.empty())
+    body += fmt::format("<script>\n{}</script>\n", evaluation::view_3d_script());
   return page(fmt::format("Flight {} through {}: {}", f["seed"].get<std::uint64_t>(),
                           whole["made_of"]["world"].get<std::string>(), f["outcome"].get<std::string>()),
               body);

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -197,9 +196,6 @@ class Web {
     auto server = live::WebServer::start(options.web, *web->publisher_);
     if (!server) return server.error();
     web->server_ = std::move(*server);
-    std::error_code failed;
-    if (!std::filesystem::exists(options.web.three, failed))
-      say(fmt::format("page: no 3-D view, since there is no {} (Debian's libjs-three)\n", options.web.three));
     say(fmt::format("page: {}{}; Foxglove: the same with ws://\n", web->server_->url(),
                     options.web.token.empty() ? "" : "?token=... (web.token)"));
     return web;

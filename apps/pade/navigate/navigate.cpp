@@ -18,8 +18,6 @@
 #include "pade/io/sequence/calibration.hpp"
 #include "pade/io/text.hpp"
 #include "pade/io/world.hpp"
-#include "pade/live/recordings/tlog.hpp"
-#include "pade/live/recordings/ulog.hpp"
 #include "pade/navigation/navigation_run.hpp"
 #include "pade/offline/checked_log.hpp"
 #include "pade/report/gnss/raw_gnss_report.hpp"
@@ -28,6 +26,7 @@
 #include "commands.hpp"
 #include "odometry.hpp"
 #include "options/json_text.hpp"
+#include "options/sensor_log.hpp"
 #include "options/unused_options.hpp"
 #include "raw_gnss.hpp"
 #include "tight.hpp"
@@ -61,6 +60,9 @@ struct NavigateArguments {
   std::string raw_coupling;
   std::string raw_gnss;
   double elevation_mask = 10;
+  gnss::PositioningOptions noise;  ///< whose sigmas are asked for
+  CLI::Option* doppler_sigma_given = nullptr;
+  CLI::Option* phase_sigma_given = nullptr;
   bool force = false;
   bool json = false;
   const CLI::App* command = nullptr;
@@ -171,8 +173,11 @@ nlohmann::ordered_json summary(const NavigationRun& run, const Score& score, con
 }
 
 gnss::PositioningOptions positioning_options(const NavigateArguments& arguments) {
-  gnss::PositioningOptions options;
+  gnss::PositioningOptions options = arguments.noise;
   options.elevation_mask = arguments.elevation_mask * kDegree;
+  // Who knows the receiver is believed.
+  options.estimate_doppler_sigma = arguments.doppler_sigma_given->count() == 0;
+  options.estimate_phase_sigma = arguments.phase_sigma_given->count() == 0;
   return options;
 }
 
@@ -202,23 +207,11 @@ nlohmann::ordered_json json_of(const navigation::RawTally& tally) {
           {"clock_jumps", tally.clock_jumps}};
 }
 
-/// A folder, or an autopilot's recording.
 Result<CheckedLog> read_log(const NavigateArguments& arguments) {
-  const bool px4 = live::is_ulog(arguments.log);
-  if (px4 || live::is_tlog(arguments.log)) {
-    if (!arguments.gnss.empty())
-      return Error{"--gnss: found a recording, which has one GNSS; expected a folder"};
-    if (!arguments.topics.empty())
-      return Error{
-          "--topics: found an autopilot's log, which has none to choose from; expected a recording of ROS"};
-    auto sensors = px4 ? live::read_ulog_sensors(arguments.log) : live::read_tlog_sensors(arguments.log);
-    if (!sensors) return sensors.error();
-    return checked_log(std::move(*sensors));
-  }
   io::NavigationLogOptions options;
   options.gnss = arguments.gnss;
   options.topics = arguments.topics;
-  return read_checked_log(arguments.log, options);
+  return read_sensor_log(arguments.log, options);
 }
 
 Status navigate(const NavigateArguments& arguments) {
@@ -244,14 +237,16 @@ Status navigate(const NavigateArguments& arguments) {
     return navigate_odometry(odometry);
   }
   if (arguments.raw || is_raw_gnss_file(arguments.log)) {
-    const Status fits =
-        refuse_unused(*arguments.command, {"--out", "--raw", "--elevation-mask", "--force", "--json"},
-                      "raw GNSS alone, without an IMU");
+    const Status fits = refuse_unused(*arguments.command,
+                                      {"--out", "--raw", "--elevation-mask", "--pseudorange-sigma",
+                                       "--doppler-sigma", "--phase-sigma", "--force", "--json"},
+                                      "raw GNSS alone, without an IMU");
     if (!fits) return fits;
     return navigate_raw(
         {arguments.log, arguments.out, positioning_options(arguments), arguments.force, arguments.json});
   }
-  for (const char* option : {"--raw-gnss", "--elevation-mask"}) {
+  for (const char* option :
+       {"--raw-gnss", "--elevation-mask", "--pseudorange-sigma", "--doppler-sigma", "--phase-sigma"}) {
     if (arguments.raw_coupling.empty() && arguments.command->get_option(option)->count() > 0) {
       return Error{fmt::format(
           "{}: found it without --raw-coupling, expected both: alone it would do nothing", option)};
@@ -414,6 +409,17 @@ void add_navigate(CLI::App& app, Context& context) {
                             : fmt::format("found {}, expected 0 to 60 degrees", io::in_quotes(text));
           },
           "FLOAT in [0 - 60]"));
+  const auto add_sigma = [&](const char* name, double& sigma, double most, const char* what) {
+    return command->add_option(name, sigma, what)->capture_default_str()->check(CLI::Range(1e-6, most));
+  };
+  add_sigma("--pseudorange-sigma", arguments->noise.pseudorange_sigma, 1e3,
+            "Of raw GNSS: noise of a pseudorange in the zenith at 45 dB-Hz, m");
+  arguments->doppler_sigma_given =
+      add_sigma("--doppler-sigma", arguments->noise.doppler_sigma, 100,
+                "The same of the range's rate, m/s; if it is not given it grows to what the residuals show");
+  arguments->phase_sigma_given =
+      add_sigma("--phase-sigma", arguments->noise.phase_sigma, 1,
+                "The same of the phase, m; if it is not given it grows to what the residuals show");
   command
       ->add_option("--raw-coupling", arguments->raw_coupling,
                    "Raw GNSS beside the IMU in place of gnss.csv: tight, each satellite for itself "

@@ -30,7 +30,7 @@ constexpr const char* kPositionsFile = "positions.csv";
 std::optional<io::RawGnssKind> kind_by_start(const fs::path& path) {
   std::error_code failure;
   if (!fs::is_regular_file(path, failure)) return std::nullopt;
-  std::string start(200, '\0');
+  std::string start(io::kRawGnssStart, '\0');
   std::ifstream stream(path, std::ios::binary);
   stream.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<std::size_t>(stream.gcount()));

@@ -53,6 +53,8 @@ nlohmann::ordered_json raw_json(const gnss::RawLog& log, const gnss::RawRun& run
                              {"vertical_rms_m", score->vertical_rms}};
   }
   json["options"] = json_of_options(options);
+  const gnss::PositioningOptions found = run.noise.applied_to(options);
+  json["noise_at_the_end"] = {{"doppler_sigma", found.doppler_sigma}, {"phase_sigma", found.phase_sigma}};
   json["remarks"] = log.remarks;
   return json;
 }
@@ -99,7 +101,7 @@ bool is_raw_gnss_file(const std::string& path) {
   std::error_code failure;
   if (!std::filesystem::is_regular_file(path, failure)) return false;
   if (is_named_so(path)) return true;  // what is in it is for the reader to say
-  std::string start(200, '\0');
+  std::string start(io::kRawGnssStart, '\0');
   std::ifstream stream(path, std::ios::binary);
   stream.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<std::size_t>(stream.gcount()));
@@ -118,14 +120,18 @@ Status navigate_raw(const RawGnssArguments& arguments) {
   }
   const gnss::RawRun run = gnss::run_raw(*log, arguments.options);
   for (std::string& sentence : gnss::unusable_satellites(run)) log->remarks.push_back(std::move(sentence));
+  for (std::string& remark : gnss::remarks_on(run.noise, arguments.options))
+    log->remarks.push_back(std::move(remark));
   const auto fixes = gnss_log_of(run);
   if (!fixes) {
+    std::string remarks;
+    for (const std::string& remark : log->remarks) remarks += "\n  " + remark;
     return Error{fmt::format(
         "{}: no epoch has enough satellites for a position; {} satellites without ephemeris, {} with "
-        "a stale one, {} unhealthy",
+        "a stale one, {} unhealthy{}",
         arguments.log, run.uses.at(static_cast<std::size_t>(gnss::Use::no_ephemeris)),
         run.uses.at(static_cast<std::size_t>(gnss::Use::stale)),
-        run.uses.at(static_cast<std::size_t>(gnss::Use::unhealthy)))};
+        run.uses.at(static_cast<std::size_t>(gnss::Use::unhealthy)), remarks)};
   }
   const auto score = score_positions(*log, run);
   const auto json = raw_json(*log, run, arguments.options, score);

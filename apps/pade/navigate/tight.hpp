@@ -22,8 +22,10 @@ struct RawInput {
 };
 
 /// Reads the raw GNSS of a folder or file (io::read_raw_gnss). The IMU's stamps may be GPS time, seconds of
-/// the GPS week, or Unix time: of these the one by which the two recordings overlap. Errors: those of the
-/// reader; no overlap; known ranges, which have no Doppler; no position.
+/// the GPS week, or Unix time: of these the one by which most epochs lie between all but the first and last
+/// hundredth of the samples. Epochs behind the last sample are left out, with a remark, as is that there is
+/// no Doppler, and that the receiver is noisier than assumed. Errors: those of the reader; no overlap; known
+/// ranges, which have no Doppler; no position.
 Result<RawInput> read_raw_input(const std::filesystem::path& path, const std::vector<ImuSample>& imu,
                                 const gnss::PositioningOptions& options);
 

@@ -23,6 +23,8 @@
 #include "pade/io/text.hpp"
 #include "pade/planning/global/route.hpp"
 #include "pade/report/plot/route_picture.hpp"
+#include "pade/report/report_text.hpp"
+#include "pade/report/view_3d/view_3d.hpp"
 
 #include "options/json_text.hpp"
 #include "plan/route_files.hpp"
@@ -104,7 +106,22 @@ struct Planned {
   Route route;
   std::optional<std::string> mission;
   std::string picture;
+  std::string page;
 };
+
+/// The route in its map that one can turn, and from above.
+std::string page_of(const Route& route, const mapping::MapView& map, const std::string& name, bool is_enu,
+                    const std::string& picture) {
+  evaluation::View3d view;
+  view.leaves = [&map](const auto& visitor) { map.for_each_leaf(visitor); };
+  view.voxel = map.voxel();
+  view.plan = positions_of(route);
+  view.is_enu = is_enu;
+  return fmt::format(
+      "{}{}\n<div class=\"map\">{}</div>\n<script>\n{}</script>\n</main></body></html>\n",
+      evaluation::begin_page("A way through " + name, ".map svg { width: 100%; height: auto; }"),
+      evaluation::view_3d(view), picture, evaluation::view_3d_script());
+}
 
 Result<Planned> find_route(const PlanArguments& arguments) {
   if (const Status sensible = planning::check(arguments.options); !sensible) return sensible.error();
@@ -129,11 +146,12 @@ Result<Planned> find_route(const PlanArguments& arguments) {
   route->notes.insert(route->notes.end(), track->notes.begin(), track->notes.end());
   auto mission = mission_of(*route, file, arguments.options.motion.speed);
   if (!mission) return mission.error();
-  std::string picture =
-      arguments.out.empty()
-          ? std::string()
-          : evaluation::route_picture(*view, positions_of(*route), route->corners, arguments.options.radius);
-  return Planned{std::move(route).value(), std::move(mission).value(), std::move(picture)};
+  Planned planned{std::move(route).value(), std::move(mission).value(), {}, {}};
+  if (arguments.out.empty()) return planned;
+  planned.picture = evaluation::route_picture(*view, positions_of(planned.route), planned.route.corners,
+                                              arguments.options.radius);
+  planned.page = page_of(planned.route, *view, file.string(), planned.mission.has_value(), planned.picture);
+  return planned;
 }
 
 nlohmann::ordered_json json_of(const PlanArguments& arguments, const Planned& planned) {
@@ -151,6 +169,7 @@ Status write(const PlanArguments& arguments, const Planned& planned) {
   if (Status s = put("route.txt", route_tum(planned.route)); !s) return s;
   if (Status s = put("route.csv", route_csv(planned.route)); !s) return s;
   if (Status s = put("route.svg", planned.picture); !s) return s;
+  if (Status s = put("route.html", planned.page); !s) return s;
   if (planned.mission) {
     if (Status s = put("route.plan", *planned.mission); !s) return s;
   }
@@ -165,8 +184,8 @@ void print(const PlanArguments& arguments, const Planned& planned) {
              arguments.options.radius);
   for (const std::string& note : route.notes) fmt::print("  note         {}\n", note);
   if (arguments.out.empty()) return;
-  fmt::print("  written      {}/ route.txt (TUM), route.csv, route.svg, route.json{}\n", arguments.out,
-             planned.mission ? ", route.plan (QGroundControl)" : "");
+  fmt::print("  written      {}/ route.txt (TUM), route.csv, route.svg, route.html, route.json{}\n",
+             arguments.out, planned.mission ? ", route.plan (QGroundControl)" : "");
   if (!planned.mission)
     fmt::print("  note         no route.plan: the map does not say where on the earth it lies\n");
 }

@@ -225,7 +225,7 @@ sensor_msgs::Image image_of(const FrameResult& result, const float* values) {
 
 nav_msgs::Path path_of(const FrameResult& result) {
   nav_msgs::Path out;
-  out.header = header(result.stamp, result.world_frame);
+  out.header = header(result.pose_stamp, result.world_frame);
   for (const PathPose& pose : *result.path) {
     geometry_msgs::PoseStamped one;
     one.header = header(pose.stamp, result.world_frame);
@@ -235,16 +235,22 @@ nav_msgs::Path path_of(const FrameResult& result) {
   return out;
 }
 
-geometry_msgs::TransformStamped transform_of(const FrameResult& result) {
-  geometry_msgs::TransformStamped out;
-  out.header = header(result.stamp, result.world_frame);
-  out.child_frame_id = result.body_frame;
-  const geometry_msgs::Pose pose = pose_of(result.T_world_body);
-  out.transform.translation.x = pose.position.x;
-  out.transform.translation.y = pose.position.y;
-  out.transform.translation.z = pose.position.z;
-  out.transform.rotation = pose.orientation;
-  return out;
+std::vector<geometry_msgs::TransformStamped> transforms_of(const FrameResult& result, bool with_body) {
+  std::vector<geometry_msgs::TransformStamped> all;
+  const auto add = [&](const std::string& child, const Placement& placement) {
+    geometry_msgs::TransformStamped out;
+    out.header = header(result.pose_stamp, result.poses_frame);
+    out.child_frame_id = child;
+    const geometry_msgs::Pose pose = pose_of(placement);
+    out.transform.translation.x = pose.position.x;
+    out.transform.translation.y = pose.position.y;
+    out.transform.translation.z = pose.position.z;
+    out.transform.rotation = pose.orientation;
+    all.push_back(out);
+  };
+  if (with_body && !result.body_frame.empty()) add(result.body_frame, result.T_world_body);
+  if (result.world_frame != result.poses_frame) add(result.world_frame, {result.origin, {0, 0, 0, 1}});
+  return all;
 }
 
 octomap_msgs::Octomap octomap_of(const MapResult& result, bool binary) {

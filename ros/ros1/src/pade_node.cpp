@@ -1,8 +1,6 @@
 // The node of ROS 1: camera and poses in, obstacle map out (docs/ros.md).
 #include <algorithm>
 #include <cstdio>
-#include <iomanip>
-#include <limits>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -30,7 +28,6 @@ namespace {
 bool flatten(XmlRpc::XmlRpcValue& value, const std::string& name, Parameters& out, std::string& error) {
   using XmlRpc::XmlRpcValue;
   std::ostringstream text;
-  text << std::setprecision(std::numeric_limits<double>::max_digits10);
   switch (value.getType()) {
     case XmlRpcValue::TypeStruct:
       for (auto& [key, field] : value) {
@@ -44,7 +41,7 @@ bool flatten(XmlRpc::XmlRpcValue& value, const std::string& name, Parameters& ou
       text << static_cast<int>(value);
       break;
     case XmlRpcValue::TypeDouble:
-      text << static_cast<double>(value);
+      text << text_of(static_cast<double>(value));
       break;
     case XmlRpcValue::TypeString:
       text << static_cast<std::string>(value);
@@ -122,7 +119,8 @@ class Publishers : public Sink {
     if (depth_.getNumSubscribers() > 0) depth_.publish(image_of(result, result.depth));
     if (!result.sigma.empty()) sigma_.publish(image_of(result, result.sigma.data()));
     if (path_.getNumSubscribers() > 0) path_.publish(path_of(result));
-    if (settings_.publish_tf && !result.body_frame.empty()) broadcaster_.sendTransform(transform_of(result));
+    const auto transforms = transforms_of(result, settings_.publish_tf);
+    if (!transforms.empty()) broadcaster_.sendTransform(transforms);
   }
   void map(const MapResult& result) override {
     if (binary_.getNumSubscribers() > 0) binary_.publish(octomap_of(result, true));

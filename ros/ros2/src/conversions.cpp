@@ -228,7 +228,7 @@ sensor_msgs::msg::Image image_of(const FrameResult& result, const float* values)
 
 nav_msgs::msg::Path path_of(const FrameResult& result) {
   nav_msgs::msg::Path out;
-  out.header = header(result.stamp, result.world_frame);
+  out.header = header(result.pose_stamp, result.world_frame);
   for (const PathPose& pose : *result.path) {
     geometry_msgs::msg::PoseStamped one;
     one.header = header(pose.stamp, result.world_frame);
@@ -238,16 +238,22 @@ nav_msgs::msg::Path path_of(const FrameResult& result) {
   return out;
 }
 
-geometry_msgs::msg::TransformStamped transform_of(const FrameResult& result) {
-  geometry_msgs::msg::TransformStamped out;
-  out.header = header(result.stamp, result.world_frame);
-  out.child_frame_id = result.body_frame;
-  const geometry_msgs::msg::Pose pose = pose_of(result.T_world_body);
-  out.transform.translation.x = pose.position.x;
-  out.transform.translation.y = pose.position.y;
-  out.transform.translation.z = pose.position.z;
-  out.transform.rotation = pose.orientation;
-  return out;
+std::vector<geometry_msgs::msg::TransformStamped> transforms_of(const FrameResult& result, bool with_body) {
+  std::vector<geometry_msgs::msg::TransformStamped> all;
+  const auto add = [&](const std::string& child, const Placement& placement) {
+    geometry_msgs::msg::TransformStamped out;
+    out.header = header(result.pose_stamp, result.poses_frame);
+    out.child_frame_id = child;
+    const geometry_msgs::msg::Pose pose = pose_of(placement);
+    out.transform.translation.x = pose.position.x;
+    out.transform.translation.y = pose.position.y;
+    out.transform.translation.z = pose.position.z;
+    out.transform.rotation = pose.orientation;
+    all.push_back(out);
+  };
+  if (with_body && !result.body_frame.empty()) add(result.body_frame, result.T_world_body);
+  if (result.world_frame != result.poses_frame) add(result.world_frame, {result.origin, {0, 0, 0, 1}});
+  return all;
 }
 
 octomap_msgs::msg::Octomap octomap_of(const MapResult& result, bool binary) {

@@ -45,7 +45,9 @@ sensor_msgs::msg::PointCloud2 cloud_of(const FrameResult& result);
 /// 32FC1. @param values  rows one behind the other
 sensor_msgs::msg::Image image_of(const FrameResult& result, const float* values);
 nav_msgs::msg::Path path_of(const FrameResult& result);
-geometry_msgs::msg::TransformStamped transform_of(const FrameResult& result);
+/// Of the vehicle, and of the map's own frame where it has one.
+/// @param with_body  that of the vehicle too
+std::vector<geometry_msgs::msg::TransformStamped> transforms_of(const FrameResult& result, bool with_body);
 /// @}
 
 /// @{

@@ -31,9 +31,11 @@ bool flatten(rclcpp::Node& node, Parameters& out, std::string& error) {
     switch (parameter.get_type()) {
       case rclcpp::ParameterType::PARAMETER_BOOL:
       case rclcpp::ParameterType::PARAMETER_INTEGER:
-      case rclcpp::ParameterType::PARAMETER_DOUBLE:
       case rclcpp::ParameterType::PARAMETER_STRING:
         out.emplace_back(name, parameter.value_to_string());
+        break;
+      case rclcpp::ParameterType::PARAMETER_DOUBLE:  // of which value_to_string() has six decimals
+        out.emplace_back(name, text_of(parameter.as_double()));
         break;
       case rclcpp::ParameterType::PARAMETER_NOT_SET:
         break;
@@ -112,7 +114,8 @@ class Publishers : public Sink {
     if (depth_->get_subscription_count() > 0) depth_->publish(image_of(result, result.depth));
     if (!result.sigma.empty()) sigma_->publish(image_of(result, result.sigma.data()));
     if (path_->get_subscription_count() > 0) path_->publish(path_of(result));
-    if (settings_.publish_tf && !result.body_frame.empty()) broadcaster_.sendTransform(transform_of(result));
+    const auto transforms = transforms_of(result, settings_.publish_tf);
+    if (!transforms.empty()) broadcaster_.sendTransform(transforms);
   }
   void map(const MapResult& result) override {
     if (binary_->get_subscription_count() > 0) binary_->publish(octomap_of(result, true));

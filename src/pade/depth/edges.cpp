@@ -14,7 +14,6 @@ void guard_edges(DepthImage& image, const EdgeOptions& options) {
   constexpr auto kMeasured = static_cast<std::uint8_t>(DepthState::measured);
   const float infinity = std::numeric_limits<float>::infinity();
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  const cv::Mat unknown = image.state != kMeasured;
   const cv::Mat square =
       cv::getStructuringElement(cv::MORPH_RECT, {2 * options.radius + 1, 2 * options.radius + 1});
   // About a wrong match others are wrong that look right.
@@ -22,8 +21,15 @@ void guard_edges(DepthImage& image, const EdgeOptions& options) {
   cv::dilate(doubtful, doubtful, square);
   image.bound.setTo(nan, doubtful);
   const auto nearest_of = [&](const cv::Mat& values) {
-    cv::Mat nearest = values.clone();
-    nearest.setTo(infinity, unknown | ~cv::Mat(values == values));
+    cv::Mat nearest(values.size(), CV_32FC1);
+    for (int v = 0; v < values.rows; ++v) {
+      const auto* value = values.ptr<float>(v);
+      const auto* state = image.state.ptr<std::uint8_t>(v);
+      auto* out = nearest.ptr<float>(v);
+      for (int u = 0; u < values.cols; ++u) {
+        out[u] = (state[u] == kMeasured) & (value[u] == value[u]) ? value[u] : infinity;
+      }
+    }
     cv::erode(nearest, nearest, square, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(infinity));
     return nearest;
   };

@@ -139,7 +139,7 @@ cv::Mat foretell_flow(const cv::Mat& depth, const Camera& camera, const Pose& T_
   }
   cv::Mat full;
   cv::resize(flow, full, {}, kCoarse, kCoarse, cv::INTER_NEAREST);
-  return cv::Mat(full, cv::Rect(0, 0, camera.width, camera.height)).clone();
+  return {full, cv::Rect(0, 0, camera.width, camera.height)};
 }
 
 }  // namespace pade::depth

@@ -187,7 +187,7 @@ NewSamples SensorGatherer::take() {
   return {take_first(imu_), take_first(fields_), take_first(heights_), std::exchange(fixes_.samples, {})};
 }
 
-Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
+Result<NavigationLog> SensorGatherer::log(const std::string& name, SensorNeed need) const {
   NavigationLog log;
   log.imu = longest(imu_);
   const std::string who = name_of(autopilot_);
@@ -202,9 +202,11 @@ Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
         "{}: the IMU is missing: found no HIGHRES_IMU, SCALED_IMU or ArduPilot's RAW_IMU of {}", name, who)};
   }
   if (fixes_.samples.empty()) {
-    return Error{fmt::format(
+    std::string missing = fmt::format(
         "{}: the GNSS is missing: found no GPS_RAW_INT with a fix in three dimensions, {} without", name,
-        without_fix_)};
+        without_fix_);
+    if (need == SensorNeed::imu_and_gnss) return Error{missing};
+    log.remarks.push_back(std::move(missing));
   }
   if (const double rate = rate_of(log.imu); rate < slowest_imu) {
     return Error{fmt::format(
@@ -214,7 +216,7 @@ Result<NavigationLog> SensorGatherer::log(const std::string& name) const {
   }
   log.magnetometer = longest(fields_);
   log.barometer = longest(heights_);
-  log.gnss = io::local_log(fixes_.samples, "GPS_RAW_INT", log.remarks);
+  if (!fixes_.samples.empty()) log.gnss = io::local_log(fixes_.samples, "GPS_RAW_INT", log.remarks);
   return log;
 }
 

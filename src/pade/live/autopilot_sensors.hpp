@@ -55,6 +55,12 @@ struct NewSamples {
   std::vector<io::GeodeticFix> fixes;
 };
 
+/// Which sensors a log must have to be of use.
+enum class SensorNeed : std::uint8_t {
+  imu_and_gnss,  ///< to navigate
+  imu,           ///< to compare turns; a GNSS that is missing is a remark
+};
+
 /// Gathers IMU, GNSS, magnetometer and barometer from the messages of one autopilot. Samples that it repeats
 /// count once.
 ///
@@ -72,7 +78,8 @@ class SensorGatherer {
   /// first fix; where the messages state no accuracy, that of io::GnssDefaults is taken, with a remark.
   /// @param name  stands in the message. Errors: the IMU or the GNSS is missing, or the IMU is too slow to
   ///              be integrated
-  [[nodiscard]] Result<NavigationLog> log(const std::string& name) const;
+  [[nodiscard]] Result<NavigationLog> log(const std::string& name,
+                                          SensorNeed need = SensorNeed::imu_and_gnss) const;
   /// Hands over what came since the last call, and keeps none of it: for a link, which has no end. Where the
   /// same comes in several messages, those of HIGHRES_IMU count, else of SCALED_IMU (SCALED_PRESSURE), as
   /// soon as there is one and until it has been silent for a second.

@@ -12,6 +12,7 @@
 #include "pade/io/text.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/camera/v4l2_source.hpp"
+#include "pade/live/camera/video_source.hpp"
 #include "pade/live/dds/dds_camera.hpp"
 #include "pade/live/dds/dds_poses.hpp"
 #include "pade/mapping/tiles/voxel_code.hpp"
@@ -49,6 +50,8 @@ Result<std::unique_ptr<FrameSource>> open_source(const LiveOptions& options,
       return open_v4l2(options.camera.path, camera.value_or(Camera{}), options.camera.rate);
     case CameraKind::dds:
       return open_topic(options, camera, *dds);
+    case CameraKind::video:
+      return open_video(options.camera.path, camera.value_or(Camera{}));
   }
   return Error{"camera.kind: found none"};
 }
@@ -125,7 +128,8 @@ Result<LiveOptions> read_live_options(const fs::path& file) {
   LiveOptions options;
   if (const Status status = io::from_yaml(*text, file.string(), options); !status) return status.error();
   for (std::string* const input : {&options.camera.path, &options.camera.calibration}) {
-    if (!input->empty()) *input = (file.parent_path() / *input).string();  // an absolute one stays
+    if (!input->empty() && !is_stream(*input))
+      *input = (file.parent_path() / *input).string();  // an absolute one stays
   }
   return options;
 }
@@ -145,8 +149,8 @@ Result<OpenCamera> open_camera(const LiveOptions& live, DdsParts* dds) {
   const fs::path file = calibration_of(options);
   std::error_code code;
   const bool any = fs::exists(file, code);
-  const bool needed =
-      options.kind == CameraKind::v4l2 || (options.kind == CameraKind::dds && !options.calibration.empty());
+  const bool needed = options.kind == CameraKind::v4l2 || options.kind == CameraKind::video ||
+                      (options.kind == CameraKind::dds && !options.calibration.empty());
   if (!any && needed) {
     return Error{fmt::format("camera.calibration: found no file \"{}\", expected the calibration of {}",
                              file.string(), options.path)};

@@ -27,20 +27,24 @@ enum class CameraKind : std::uint8_t {
   folder,  ///< a recorded sequence at its real pace
   v4l2,    ///< a camera of the kernel's video interface
   dds,     ///< a topic of ROS 2
+  video,   ///< a video file at its real pace, or a stream
 };
 
 /// Of the camera.
 struct CameraOptions {
   CameraKind kind = CameraKind::v4l2;
-  std::string path = "/dev/video0";  ///< device, folder or topic
+  std::string path = "/dev/video0";  ///< device, folder, topic, file or address
   std::string calibration;           ///< file (docs/formats.md); empty: the folder's own, or dds.camera_info
   double rate = 15;                  ///< frames per second that a device is asked for
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
-    field("kind", self.kind, "v4l2; folder: a recorded sequence at its real pace; dds: a topic of ROS 2");
+    field("kind", self.kind,
+          "v4l2; folder: a recorded sequence at its real pace; dds: a topic of ROS 2; video: a file at its "
+          "real pace, or a stream");
     field("path", self.path,
-          "device, folder or topic; one that ends in /compressed has sensor_msgs/CompressedImage");
+          "device, folder, topic (one that ends in /compressed has sensor_msgs/CompressedImage), video file "
+          "or address such as rtsp://192.168.0.10/main");
     field("calibration", self.calibration,
           "file with lens and mounting; empty: the folder's own, or the lens of dds.camera_info");
     field("rate", self.rate, "frames per second that a device is asked for");
@@ -132,5 +136,6 @@ template <>
 struct pade::EnumNames<pade::live::CameraKind> {
   static constexpr std::array names = {std::pair{pade::live::CameraKind::folder, std::string_view("folder")},
                                        std::pair{pade::live::CameraKind::v4l2, std::string_view("v4l2")},
-                                       std::pair{pade::live::CameraKind::dds, std::string_view("dds")}};
+                                       std::pair{pade::live::CameraKind::dds, std::string_view("dds")},
+                                       std::pair{pade::live::CameraKind::video, std::string_view("video")}};
 };

@@ -46,6 +46,9 @@ class FrameSource {
   [[nodiscard]] virtual cv::Mat mask() const = 0;
   /// Why no frame comes, where it is known; the thread of next().
   [[nodiscard]] virtual std::string remark() const { return {}; }
+  /// How far the times of its newest frames lie behind ours, beside what a frame takes to come: a recording
+  /// that is played at half its pace falls behind by half a second in each. s; any thread.
+  [[nodiscard]] virtual double behind() const { return 0; }
 };
 
 /// Where the vehicle was. Any thread.
@@ -75,6 +78,10 @@ struct LiveUpdate {
   cv::Mat image{};                               ///< as LiveFrame::image; may be kept
   /// What the mapper did; valid until the sink returns, so clone what is to be kept. Not null in a session.
   const MapperUpdate* mapped = nullptr;
+  /// Where the 0 0 0 of the map's world is in the world of the poses, m: there as well, unless the vehicle
+  /// has come so far that a map from there would end around it.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  double behind = 0;  ///< FrameSource::behind()
 };
 
 /// A frame as it goes into the mapper.
@@ -109,6 +116,10 @@ class Sink {
   virtual void take(const LiveUpdate& update) = 0;
   /// A frame that the map has nothing of: without a pose or a partner, or unusable.
   virtual void pass(const LiveFrame& /*frame*/) {}
+  /// A frame that was left out has made the map forget what nobody saw again (MapOptions::forget_after).
+  /// @param view  of the map now
+  virtual void forget(const std::shared_ptr<const mapping::MapView>& /*view*/,
+                      const mapping::MapChange& /*change*/) {}
   /// The poses have jumped, or the vehicle has come too far: what comes from now on is in another world, and
   /// the map is empty.
   virtual void begin_anew() {}

@@ -44,12 +44,16 @@ Status MapSaver::write_last(const mapping::OccupancyMap& map) {
   return io::write_lasting_file(file_, io::encode_map(map, format_of(file_)));
 }
 
-void MapSaver::take(const LiveUpdate& update) {
-  const mapping::TileBounds& known = update.view->tiles().bounds;
+void MapSaver::take(const LiveUpdate& update) { keep(update.view); }
+
+void MapSaver::forget(const View& view, const mapping::MapChange& /*change*/) { keep(view); }
+
+void MapSaver::keep(const View& view) {
+  const mapping::TileBounds& known = view->tiles().bounds;
   if (known.first[0] > known.last[0]) return;
   const std::lock_guard lock(mutex_);
-  last_ = update.view;
-  newest_ = update.view;
+  last_ = view;
+  newest_ = view;
 }
 
 void MapSaver::begin_anew() {

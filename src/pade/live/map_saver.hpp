@@ -33,6 +33,8 @@ struct SaverReport {
 /// those of earlier sessions and of before a jump of the poses stay, under the first free number (map-1.bt,
 /// map-2.bt, ...).
 class MapSaver : public Sink {
+  using View = std::shared_ptr<const mapping::MapView>;
+
  public:
   /// @param file   .bt or .ot
   /// @param every  s between the end of one and the start of the next; 0: only maps that end because the
@@ -48,12 +50,13 @@ class MapSaver : public Sink {
 
   /// Views in which nothing is known are none.
   void take(const LiveUpdate& update) override;
+  void forget(const View& view, const mapping::MapChange& change) override;
   /// The map so far goes to a file of its own.
   void begin_anew() override;
   [[nodiscard]] SaverReport report() const;
 
  private:
-  using View = std::shared_ptr<const mapping::MapView>;
+  void keep(const View& view);
   void work();
   void save(const View& view, bool is_finished);
   [[nodiscard]] std::filesystem::path free_name() const;

@@ -16,7 +16,7 @@
 #include "pade/core/option_check.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/link/obstacle_points.hpp"
-#include "pade/mapping/tiles/voxel_code.hpp"
+#include "pade/mapping/query/map_border.hpp"
 
 namespace pade::live {
 namespace {
@@ -111,6 +111,11 @@ double share_with_depth(const DepthImage& image) {
   return static_cast<double>(known) / static_cast<double>(image.depth.total());
 }
 
+/// A time that a recording tells, in our time of when it is told.
+Time in_ours(Time time, double behind) {
+  return {time.nanoseconds + static_cast<std::int64_t>(behind * 1e9)};
+}
+
 }  // namespace
 
 Status check(const SessionOptions& options) {
@@ -162,7 +167,7 @@ void Session::run(const std::function<bool()>& stop) {
       const FrameSource::Outcome outcome = parts_.camera.next(frame, kPatience);
       if (outcome == FrameSource::Outcome::ended) break;
       if (outcome == FrameSource::Outcome::nothing) continue;
-      parts_.progress.image = frame.time.nanoseconds;
+      parts_.progress.image = in_ours(frame.time, parts_.camera.behind()).nanoseconds;
       newest.put(std::move(frame));
     }
     newest.end();
@@ -184,7 +189,7 @@ void Session::run(const std::function<bool()>& stop) {
       }
       waiting.push_back(std::move(*frame));
     }
-    map_next(waiting, now_of_ours());
+    map_next(waiting, in_ours(now_of_ours(), -parts_.camera.behind()));
     count();
   }
   camera.end();
@@ -245,11 +250,13 @@ bool Session::map_next(std::vector<LiveFrame>& waiting, Time now) {
   if (answer.kind == PoseAnswer::Kind::valid) {
     if (answer.jumps != jumps_ && begin_anew()) origin_.setZero();
     jumps_ = answer.jumps;
-    const bool far = is_near_the_border(answer.T_world_body.translation);
+    const bool far =
+        mapping::is_near_the_border(answer.T_world_body.translation - origin_, mapper_options_.map.voxel);
     if (far && any_frame_) counts_.borders += begin_anew() ? 1 : 0;
     if (far && !any_frame_) origin_ = answer.T_world_body.translation;
+    const Time begun = now_of_ours();
     map_frame(frame, {answer.T_world_body.rotation, answer.T_world_body.translation - origin_});
-    const double took = seconds_between(now, now_of_ours());
+    const double took = seconds_between(begun, now_of_ours());
     busy_ = busy_ > 0 ? 0.7 * busy_ + 0.3 * took : took;
   } else {
     skip(answer.kind == PoseAnswer::Kind::never ? std::string(answer.why) : "no pose in time");
@@ -261,14 +268,6 @@ bool Session::map_next(std::vector<LiveFrame>& waiting, Time now) {
 
 void Session::pass(const LiveFrame& frame) {
   for (Sink* const sink : parts_.sinks) sink->pass(frame);
-}
-
-/// Whether what the camera and the sectors reach to may lie where no map that begins at the origin can hold
-/// it.
-bool Session::is_near_the_border(const Eigen::Vector3d& place) const {
-  constexpr double kReach = 200;  // m
-  const double half = mapper_options_.map.voxel * mapping::kTreeCentre;
-  return (place - origin_).cwiseAbs().maxCoeff() > half - std::min(kReach, half / 2);
 }
 
 /// What comes does not belong to what was there. False if that cannot be.
@@ -293,8 +292,10 @@ void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
     parts_.recorder->take({frame.image, frame.time, T_world_camera, covariance});
   const MapperUpdate& update = mapper_.add(frame.image, frame.time, T_world_camera, covariance);
   if (update.outcome == MapperUpdate::Outcome::skipped) {
-    if (view_ && !update.change.touched.empty())
-      view_ = view_->after(mapper_.map(), update.change);                      // what it forgot
+    if (view_ && !update.change.touched.empty()) {
+      view_ = view_->after(mapper_.map(), update.change);  // what it forgot
+      for (Sink* const sink : parts_.sinks) sink->forget(view_, update.change);
+    }
     skip(update.reason.substr(0, update.reason.find_first_of("0123456789")));  // one count for each kind
     pass(frame);
     return;
@@ -309,10 +310,12 @@ void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
   counts_.outside += update.change.outside;
   view_ = view_ ? view_->after(mapper_.map(), update.change) : mapping::MapView::of(mapper_.map());
   const double share = share_with_depth(update.depth);
-  if (share >= options_.least_depth) parts_.progress.depth = frame.time.nanoseconds;
+  const double behind = parts_.camera.behind();
+  if (share >= options_.least_depth) parts_.progress.depth = in_ours(frame.time, behind).nanoseconds;
   const LiveUpdate result{frame.time,  camera_pose(mapper_.T_world_camera(), parts_.T_body_camera.inverse()),
                           view_,       share,
-                          frame.image, &update};
+                          frame.image, &update,
+                          origin_,     behind};
   for (Sink* const sink : parts_.sinks) sink->take(result);
 }
 

@@ -134,7 +134,6 @@ class Session {
   void map_frame(const LiveFrame& frame, const Pose& T_world_body);
   void skip(const std::string& reason);
   void pass(const LiveFrame& frame);
-  [[nodiscard]] bool is_near_the_border(const Eigen::Vector3d& place) const;
   bool begin_anew();
 
   SessionParts parts_;

@@ -44,6 +44,18 @@ BaselineSigmas baseline_sigmas(const Vector3d& translation, const Matrix3d& cova
           trace > 0 ? std::sqrt(across.squaredNorm() / trace) : 0};
 }
 
+RawTally operator+(RawTally a, const RawTally& b) {
+  const auto add = [](RawCounts& sum, const RawCounts& more) {
+    sum.used += more.used;
+    sum.refused += more.refused;
+  };
+  add(a.ranges, b.ranges);
+  add(a.rates, b.rates);
+  add(a.phases, b.phases);
+  a.clock_jumps += b.clock_jumps;
+  return a;
+}
+
 /// Buffers reach back over the history, the levelling window and what the bank of hypotheses waits for.
 double buffered_seconds(const NavigatorOptions& options) {
   return options.history + options.alignment.level_time + options.alignment.motion_window +
@@ -64,7 +76,7 @@ class Navigator::Core {
   Health health();
   [[nodiscard]] const NavigatorOptions& options() const { return options_; }
   [[nodiscard]] RawTally raw_tally() const {
-    return phase_ == AlignmentPhase::aligned ? live_.core().raw.tally : RawTally{};
+    return phase_ == AlignmentPhase::aligned ? tally_before_ + live_.core().raw.tally : tally_before_;
   }
   [[nodiscard]] CameraState camera() const {
     return phase_ == AlignmentPhase::aligned ? live_.core().camera : CameraState{};
@@ -100,6 +112,7 @@ class Navigator::Core {
   Health health_;
   std::uint64_t times_lost_before_ = 0;  ///< the last restart
   std::uint64_t doubted_before_ = 0;
+  RawTally tally_before_;
   std::function<void(const Measurement&)> sink_;
 };
 
@@ -118,6 +131,7 @@ void Navigator::Core::restart() {
   if (phase_ == AlignmentPhase::aligned) {
     times_lost_before_ += static_cast<std::uint64_t>(live_.core().integrity.times_lost);
     doubted_before_ += static_cast<std::uint64_t>(live_.core().integrity.times_doubted);
+    tally_before_ = tally_before_ + live_.core().raw.tally;
   }
   phase_ = AlignmentPhase::waiting;
   alignment_.reset();

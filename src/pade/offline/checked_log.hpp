@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,11 @@ void check_with_latencies(CheckedLog& checked, const navigation::NavigatorOption
 /// The same of a log folder. Errors: io::read_navigation_log.
 Result<CheckedLog> read_checked_log(const std::filesystem::path& folder,
                                     const io::NavigationLogOptions& options = {});
+
+/// Reads the sensors at a place; `topics` are those of a recording that are meant where several fit. Readers
+/// that know more kinds of logs than read_checked_log() can take its place.
+using LogReader =
+    std::function<Result<CheckedLog>(const std::filesystem::path& place, const std::string& topics)>;
 
 /// The hints of a log and those of its run, worst first.
 std::vector<Hint> all_hints(const CheckedLog& checked, const NavigationRun& run);

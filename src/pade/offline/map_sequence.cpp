@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <map>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
+#include "pade/offline/calibration/clock_calibration.hpp"
 #include "pade/offline/poses_from_sensors.hpp"
 #include "pade/offline/run_tally.hpp"
 #include "pade/report/report.hpp"
@@ -61,15 +63,6 @@ Status check_footing(const io::Sequence& sequence, const depth::FootingOptions& 
       fmt::format("footing.on: needs poses in a world whose up is +z; found {}; leave it off, or state "
                   "the true up with --world-up or world_up in camera.yaml",
                   up ? io::to_text(up->direction) + " (" + up->source + ")" : "no common up")};
-}
-
-/// For images that have none yet.
-Result<io::ComputedPoses> no_poses(const std::filesystem::path& /*folder*/, const std::vector<Time>& images,
-                                   const io::Calibration& /*calibration*/) {
-  io::ComputedPoses none;
-  for (const Time time : images) none.poses.push_back({time, {}});
-  none.covariances.assign(images.size(), Matrix6d::Zero());
-  return none;
 }
 
 /// Reads frames in order, with a second thread one frame ahead.
@@ -333,7 +326,30 @@ Status read_options(std::string_view text, std::string_view file, MapSequenceOpt
   return io::from_yaml(text, file, options);
 }
 
-Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options) {
+/// Fills in the offset from the turns of images and gyroscope. What was read once is kept.
+static Status find_offset(const io::Sequence& images,
+                          const std::function<bool(std::size_t, std::size_t)>& progress,
+                          SensorSource& source) {
+  const std::filesystem::path place = source.log.empty() ? images.folder() : source.log;
+  io::NavigationLogOptions log_options;
+  log_options.topics = source.topics;
+  auto checked = source.read ? source.read(place, source.topics) : read_checked_log(place, log_options);
+  if (!checked) return checked.error();
+  const auto found = calibrate_clock(images, checked->log.imu, progress);
+  if (!found) return found.error();
+  const TurnAlignment& a = found->alignment;
+  source.time_offset = a.offset;
+  source.found = fmt::format("found from the turns of {} pairs of images (1 sigma {:.2f} ms)", a.pairs,
+                             1e3 * a.offset_sigma);
+  for (const std::string& note : notes_on(*found, images.calibration().T_body_camera))
+    source.found += "; " + note;
+  source.read = [kept = std::move(*checked)](const auto&, const auto&) -> Result<CheckedLog> { return kept; };
+  return {};
+}
+
+Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options,
+                                   const LogReader& reader,
+                                   const std::function<bool(std::size_t, std::size_t)>& progress) {
   const bool fed = options.navigation.filter.camera;
   if (fed && options.sequence.poses != poses_from_sensors) {
     return Error{fmt::format(
@@ -346,16 +362,40 @@ Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const Ma
         "navigation.filter.camera (--feed-camera) is on and mapper.refinement.on (--refine-motion) is off, "
         "expected on: it is the refinement that finds the motion"};
   }
-  if (options.sequence.poses != poses_from_sensors) return io::Sequence::open(folder, options.sequence);
-  const std::string& topics = options.sequence.topics;
-  if (!fed)
-    return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation, topics));
+  if (options.sequence.poses != poses_from_sensors) {
+    for (const auto& [name, value] :
+         {std::pair{"log", &options.log}, {"time-offset", &options.time_offset}}) {
+      if (value->empty()) continue;
+      return Error{
+          fmt::format("--{}: found {} and the poses are {}, expected --poses {}: nothing else reads it", name,
+                      io::in_quotes(*value), options.sequence.poses, poses_from_sensors)};
+    }
+    return io::Sequence::open(folder, options.sequence);
+  }
+  SensorSource source{
+      options.log, options.log.empty() ? options.sequence.topics : std::string(), reader, {}, {}};
+  const bool searched = options.time_offset == "auto";
+  if (!searched && !options.time_offset.empty()) {
+    source.time_offset = io::parse_number(options.time_offset);
+    constexpr double kMost = 4e9;  // s, as far as stamps go
+    if (!source.time_offset || !(std::abs(*source.time_offset) < kMost)) {
+      return Error{fmt::format("--time-offset: found {}, expected seconds or auto",
+                               io::in_quotes(options.time_offset))};
+    }
+  }
+  if (!fed && !searched)
+    return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation, source));
   // First for the images alone, of which the filter has yet to say which ones have a pose.
-  const auto images = io::Sequence::open(folder, options.sequence, no_poses);
+  const auto images = open_images(folder, options.sequence);
   if (!images) return images.error();
+  if (searched) {
+    if (Status status = find_offset(*images, progress, source); !status) return status.error();
+  }
+  if (!fed)
+    return io::Sequence::open(folder, options.sequence, poses_from_imu_gnss(options.navigation, source));
   const FedImages looked_at{*images, options.mapper.refinement};
   return io::Sequence::open(folder, options.sequence,
-                            poses_from_imu_gnss(options.navigation, topics, &looked_at));
+                            poses_from_imu_gnss(options.navigation, source, &looked_at));
 }
 
 Result<MapResult> map_sequence(const io::Sequence& sequence, const MapSequenceOptions& options,

@@ -13,6 +13,7 @@
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/mapping/cloud_builder.hpp"
 #include "pade/navigation/navigator.hpp"
+#include "pade/offline/checked_log.hpp"
 #include "pade/pipeline/obstacle_mapper.hpp"
 
 namespace pade {
@@ -21,6 +22,8 @@ namespace pade {
 struct MapSequenceOptions {
   ObstacleMapperOptions mapper;
   io::SequenceOptions sequence;
+  std::string log;          ///< empty: the sensors are beside the images
+  std::string time_offset;  ///< "": what the calibration says; seconds, or auto
   navigation::ImuClass imu = navigation::ImuClass::industrial;
   navigation::NavigatorOptions navigation;
   mapping::CloudOptions cloud;
@@ -32,6 +35,11 @@ struct MapSequenceOptions {
   static void visit(Self& self, Visitor&& field) {
     field("mapper", self.mapper, "the pipeline");
     field("sequence", self.sequence, "how the recording is read");
+    field("log", self.log, "where the sensors are, if not beside the images, where poses are from-imu-gnss");
+    field("time_offset", self.time_offset,
+          "time of a pose = time of the image + this, s, where poses are from-imu-gnss; auto: found from the "
+          "turns of "
+          "images and gyroscope; empty: what the calibration says");
     field("imu", self.imu, "industrial | consumer: class of the IMU where poses are from-imu-gnss");
     field("navigation", self.navigation,
           "the filter where poses are from-imu-gnss; what the calibration says of its mounting goes first");
@@ -54,9 +62,14 @@ Status read_options(std::string_view text, std::string_view file, MapSequenceOpt
 void set_imu(MapSequenceOptions& options, navigation::ImuClass imu);
 
 /// Opens a sequence with the poses that the options ask for: read from a file, or from-imu-gnss, for which
-/// the images are looked at first if navigation.filter.camera says so. Error also if it does with poses of
-/// another source, or with mapper.refinement.on off.
-Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options);
+/// the images are looked at first if navigation.filter.camera or time_offset (auto) say so. Error also if
+/// navigation.filter.camera, log or time_offset is given with poses of another source, or the first with
+/// mapper.refinement.on off; where the offset is to be found and cannot be (calibrate_clock()).
+/// @param reader  of the sensors; empty: read_checked_log()
+/// @param progress  of looking for the offset, as calibrate_clock() has it
+Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const MapSequenceOptions& options,
+                                   const LogReader& reader = {},
+                                   const std::function<bool(std::size_t, std::size_t)>& progress = {});
 
 /// How far a run is.
 struct MapProgress {

@@ -1,7 +1,9 @@
 #include "pade/offline/poses_from_sensors.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <functional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -31,6 +33,54 @@ std::vector<std::string> notes_on(const CameraFeedback& feedback, const Navigati
   return notes;
 }
 
+/// Seconds with as many digits as they have, up to microseconds.
+std::string seconds_text(double seconds) { return fmt::format("{:.6f} s", seconds); }
+
+/// A sentence on the clocks; empty where both are one, as far as anybody says.
+std::string note_on_clocks(const SensorSource& source, const std::optional<double>& calibrated) {
+  constexpr const char* kMeaning = "time of a pose = time of the image";
+  if (source.time_offset) {
+    const std::string unused =
+        calibrated && *calibrated != *source.time_offset
+            ? fmt::format("; the calibration's {} is not used", seconds_text(*calibrated))
+            : std::string();
+    return fmt::format("{} + {}, {}{}", kMeaning, seconds_text(*source.time_offset),
+                       source.found.empty() ? "as was given" : source.found, unused);
+  }
+  if (calibrated && (*calibrated != 0 || !source.log.empty()))
+    return fmt::format("{} + {}, as the calibration says", kMeaning, seconds_text(*calibrated));
+  return {};
+}
+
+/// The log on the clock of the images: offsets between clocks may be as long as the years since 1970.
+void put_on_image_clock(NavigationLog& log, double offset) {
+  const std::int64_t shift = Time::from_seconds(offset).nanoseconds;
+  const auto move = [&](auto& items) {
+    for (auto& item : items) item.time.nanoseconds -= shift;
+  };
+  move(log.imu);
+  move(log.gnss.fixes);
+  move(log.gnss.velocities);
+  move(log.barometer);
+  move(log.magnetometer);
+  move(log.truth);
+}
+
+/// Refuses images and sensors that have no time in common.
+Status check_overlap(const std::string& name, const NavigationLog& log, const std::vector<Time>& images,
+                     double offset) {
+  if (log.imu.empty() || images.empty()) return {};
+  const double begin = seconds_between(log.imu.front().time, images.front()) + offset;
+  const double end = seconds_between(log.imu.front().time, images.back()) + offset;
+  const double whole = seconds_between(log.imu.front().time, log.imu.back().time);
+  if (end >= 0 && begin <= whole) return {};
+  return Error{
+      fmt::format("{}: the images are of {:.3f} to {:.3f} s after the first sample of the IMU (time offset "
+                  "{:.6f} s), expected "
+                  "some of the {:.3f} s that it lasts; pade calibrate time finds the offset",
+                  name, begin, end, offset, whole)};
+}
+
 }  // namespace
 
 Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::path& folder,
@@ -42,11 +92,17 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
   log_options.topics = topics;
   const auto checked = read_checked_log(folder, log_options);
   if (!checked) return checked.error();
-  const NavigationLog* const log = &checked->log;
+  return camera_trajectory_of(*checked, folder.string(), frames, mounting, options, images);
+}
+
+Result<CameraTrajectory> camera_trajectory_of(const CheckedLog& checked, const std::string& name,
+                                              const std::vector<Time>& frames, const CameraMounting& mounting,
+                                              const navigation::NavigatorOptions& options,
+                                              const FedImages* images) {
+  const NavigationLog* const log = &checked.log;
   if (log->gnss.velocities.empty() || log->gnss.fixes.empty()) {
-    return Error{
-        fmt::format("{}: no GNSS positions and velocities found, expected them in gnss.csv or the recording",
-                    folder.string())};
+    return Error{fmt::format(
+        "{}: no GNSS positions and velocities found, expected them in gnss.csv or the recording", name)};
   }
   NavigationRunOptions run_options;
   run_options.navigator = options;
@@ -65,9 +121,9 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
 
   CameraTrajectory trajectory = camera_trajectory(run, mounting.T_body_camera);
   trajectory.origin = log->gnss.origin;
-  trajectory.hints = all_hints(*checked, run);
+  trajectory.hints = all_hints(checked, run);
   if (feedback) trajectory.notes = notes_on(*feedback, run);
-  if (trajectory.times.empty()) return never_aligned(folder.string(), *checked, run);
+  if (trajectory.times.empty()) return never_aligned(name, checked, run);
   return trajectory;
 }
 
@@ -100,20 +156,45 @@ std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
   return notes;
 }
 
-io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options, const std::string& topics,
+io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options, const SensorSource& source,
                                    const FedImages* images) {
-  return [options, topics, images](const std::filesystem::path& folder, const std::vector<Time>& times,
+  return [options, source, images](const std::filesystem::path& folder, const std::vector<Time>& times,
                                    const io::Calibration& calibration) -> Result<io::ComputedPoses> {
     if (!calibration.T_body_camera) {
       return Error{
           fmt::format("{}: field T_body_camera is missing in the calibration, expected it because the poses "
                       "come from the "
-                      "body's sensors",
+                      "body's sensors (pade calibrate mounting finds its rotation)",
                       folder.string())};
     }
-    const CameraMounting mounting{*calibration.T_body_camera, calibration.time_offset_s,
-                                  calibration.gnss_lever_arm};
-    const auto trajectory = camera_trajectory_from_imu_gnss(folder, times, mounting, options, topics, images);
+    const bool apart = !source.log.empty();
+    if (apart && !source.time_offset && !calibration.time_offset_s) {
+      return Error{
+          fmt::format("{}: how its clock relates to that of the images is not said, expected --time-offset "
+                      "with seconds or auto, "
+                      "or time_offset_s in the calibration (0 if the clock is one)",
+                      source.log.string())};
+    }
+    CameraMounting mounting{*calibration.T_body_camera, calibration.time_offset_s,
+                            calibration.gnss_lever_arm};
+    if (source.time_offset) mounting.time_offset = source.time_offset;
+    const std::filesystem::path& place = apart ? source.log : folder;
+    const auto read = [&] {
+      if (source.read) return source.read(place, source.topics);
+      io::NavigationLogOptions log_options;
+      log_options.topics = source.topics;
+      return read_checked_log(place, log_options);
+    };
+    auto checked = read();
+    if (!checked) return checked.error();
+    if (apart || source.time_offset) {
+      const double offset = mounting.time_offset.value_or(options.camera_time_offset);
+      if (const Status status = check_overlap(place.string(), checked->log, times, offset); !status)
+        return status.error();
+      put_on_image_clock(checked->log, offset);
+      mounting.time_offset = 0;
+    }
+    const auto trajectory = camera_trajectory_of(*checked, place.string(), times, mounting, options, images);
     if (!trajectory) return trajectory.error();
     io::ComputedPoses result;
     for (std::size_t i = 0; i < trajectory->times.size(); ++i) {
@@ -124,6 +205,16 @@ io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options, 
         std::count(trajectory->scale_valid.begin(), trajectory->scale_valid.end(), false));
     result.navigation = trajectory->health;
     result.notes = notes_on(*trajectory);
+    if (std::string note = note_on_clocks(source, calibration.time_offset_s); !note.empty())
+      result.notes.push_back(std::move(note));
+    if (apart) {
+      std::string note = fmt::format("the sensors are those of {}", place.string());
+      if (const auto& origin = trajectory->origin)
+        note += fmt::format(", 0 0 0 is latitude {:.7f}, longitude {:.7f}, height {:.2f} m", origin->latitude,
+                            origin->longitude, origin->height);
+      result.notes.push_back(std::move(note));
+      result.notes.insert(result.notes.end(), checked->log.remarks.begin(), checked->log.remarks.end());
+    }
     return result;
   };
 }

@@ -10,6 +10,7 @@
 #include "pade/depth/motion/motion_refinement.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/navigation/navigation_run.hpp"
+#include "pade/offline/checked_log.hpp"
 
 namespace pade {
 
@@ -37,6 +38,12 @@ Result<CameraTrajectory> camera_trajectory_from_imu_gnss(const std::filesystem::
                                                          const std::string& topics = {},
                                                          const FedImages* images = nullptr);
 
+/// The same of a log that was read. @param name  of it, in messages
+Result<CameraTrajectory> camera_trajectory_of(const CheckedLog& log, const std::string& name,
+                                              const std::vector<Time>& frames, const CameraMounting& mounting,
+                                              const navigation::NavigatorOptions& options = {},
+                                              const FedImages* images = nullptr);
+
 /// What a person should know of the trajectory: motions of doubtful length and direction, and frames left
 /// out.
 std::vector<std::string> notes_on(const CameraTrajectory& trajectory);
@@ -44,10 +51,20 @@ std::vector<std::string> notes_on(const CameraTrajectory& trajectory);
 /// What `--poses from-imu-gnss` is called in options and runs.
 inline constexpr const char* poses_from_sensors = "from-imu-gnss";
 
-/// The same as a source of poses for io::Sequence. Errors: those of the function above; no GNSS data; a
-/// calibration without T_body_camera.
-/// @param topics  of a recording (io::NavigationLogOptions::topics). @param images  null: none is fed back
+/// Where the sensors are, and how their clock relates to that of the images.
+struct SensorSource {
+  std::filesystem::path log;          ///< empty: beside the images
+  std::string topics;                 ///< of a recording (io::NavigationLogOptions::topics)
+  LogReader read;                     ///< empty: read_checked_log()
+  std::optional<double> time_offset;  ///< t_imu = t_image + offset, s; empty: what the calibration says
+  std::string found;                  ///< how the offset was found, one sentence; empty: it was given
+};
+
+/// The same as a source of poses for io::Sequence, with a note on the clocks where there is anything to say.
+/// Errors: those of the functions above; no GNSS data; a calibration without T_body_camera; a log apart from
+/// the images without a stated offset, or that does not overlap with them.
+/// @param images  null: none is fed back
 io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options,
-                                   const std::string& topics = {}, const FedImages* images = nullptr);
+                                   const SensorSource& source = {}, const FedImages* images = nullptr);
 
 }  // namespace pade

@@ -15,6 +15,7 @@
 #include "pade/report/report_style.hpp"
 #include "pade/report/report_text.hpp"
 #include "pade/report/tables/accuracy_tables.hpp"
+#include "pade/report/view_3d/view_3d.hpp"
 
 namespace pade::evaluation {
 namespace {
@@ -264,8 +265,21 @@ std::string map_notes(const Report& report, const MapViews& views) {
   return html + "</p>\n";
 }
 
+/// The map that one can turn.
+std::string turning_view(const Report& report) {
+  View3d view;
+  if (report.map != nullptr) {
+    view.leaves = [&map = *report.map](const auto& visitor) { map.for_each_leaf(visitor); };
+    view.voxel = report.map->options().voxel;
+  }
+  view.way = report.trajectory;
+  if (report.info.world_up) view.up = report.info.world_up->direction;
+  view.is_enu = report.info.origin && view.up.isApprox(Eigen::Vector3d::UnitZ());
+  return view_3d(view);
+}
+
 std::string map_section(const Report& report) {
-  std::string html = "<h2>Map</h2>\n";
+  std::string html = "<h2>Map</h2>\n" + turning_view(report);
   const auto scene = scene_of(report);
   const bool obstacles = report.info.map && report.info.map->occupied_voxels > 0;
   if (!obstacles) html += "<p class=\"soft\">Nothing is occupied.</p>\n";
@@ -340,6 +354,8 @@ std::string to_html(const Report& report) {
   html += timing_section(report.timing);
   html += health_section(report.info);
   html += options_section(report.info);
+  if (html.find("class=\"map3d\"") != std::string::npos)
+    html += fmt::format("<script>\n{}</script>\n", view_3d_script());
   return html + "</body>\n</html>\n";
 }
 

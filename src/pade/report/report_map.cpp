@@ -12,38 +12,12 @@
 #include <opencv2/core.hpp>
 
 #include "pade/evaluation/map/corridor.hpp"
+#include "pade/report/map_axes.hpp"
 #include "pade/report/report_drawing.hpp"
 #include "pade/report/report_pictures.hpp"
 
 namespace pade::evaluation {
 namespace {
-
-constexpr double kAligned = 0.9998;  // cosine of about a degree
-
-struct Axes {  // of the views: two horizontal ones and up, right-handed, with their names
-  std::array<Eigen::Vector3d, 3> direction;
-  std::array<std::string, 3> name;
-};
-
-std::string axis_name(const Eigen::Vector3d& direction) {
-  int largest = 0;
-  direction.cwiseAbs().maxCoeff(&largest);
-  const bool aligned = std::abs(direction[largest]) > kAligned;
-  return fmt::format("{}{}{}", direction[largest] < 0 ? "−" : "", "xyz"[largest], aligned ? "" : "′");
-}
-
-Axes axes_of(const Eigen::Vector3d& up) {
-  // The world axis after the vertical one (x after z, z after y) is least surprising as the first horizontal
-  // one.
-  int vertical = 0;
-  up.cwiseAbs().maxCoeff(&vertical);
-  const int first = vertical == 2 ? 0 : vertical == 1 ? 0 : 1;
-  Eigen::Vector3d right = Eigen::Vector3d::Unit(first);
-  right = (right - right.dot(up) * up).normalized();
-  Axes axes{{right, up.cross(right), up}, {}};
-  for (std::size_t i = 0; i < 3; ++i) axes.name[i] = axis_name(axes.direction[i]);
-  return axes;
-}
 
 struct Interval {
   double from = std::numeric_limits<double>::infinity();
@@ -56,14 +30,10 @@ struct Interval {
   [[nodiscard]] double length() const { return to - from; }
 };
 
-using Points = std::vector<std::array<double, 3>>;  // along Axes
-
-std::array<double, 3> along(const Eigen::Vector3d& v, const Axes& axes) {
-  return {axes.direction[0].dot(v), axes.direction[1].dot(v), axes.direction[2].dot(v)};
-}
+using Points = std::vector<std::array<double, 3>>;  // along MapAxes
 
 /// Centres of all occupied voxels; of a cube those of all its voxels.
-Points occupied_voxels(const mapping::OccupancyMap& map, const Axes& axes) {
+Points occupied_voxels(const mapping::OccupancyMap& map, const MapAxes& axes) {
   Points points;
   const double voxel = map.options().voxel;
   for (const mapping::MapCell& cell : map.occupied()) {
@@ -71,15 +41,15 @@ Points occupied_voxels(const mapping::OccupancyMap& map, const Axes& axes) {
     const Eigen::Vector3d first = cell.centre.cast<double>().array() - 0.5 * (side - 1) * voxel;
     for (int i = 0; i < side * side * side; ++i) {
       const Eigen::Vector3d step(i % side, i / side % side, i / (side * side));
-      points.push_back(along(first + voxel * step, axes));
+      points.push_back(axes.along(first + voxel * step));
     }
   }
   return points;
 }
 
-Points along(const std::vector<Eigen::Vector3d>& vectors, const Axes& axes) {
+Points along(const std::vector<Eigen::Vector3d>& vectors, const MapAxes& axes) {
   Points points;
-  for (const Eigen::Vector3d& vector : vectors) points.push_back(along(vector, axes));
+  for (const Eigen::Vector3d& vector : vectors) points.push_back(axes.along(vector));
   return points;
 }
 
@@ -117,7 +87,7 @@ Interval snapped(const Interval& interval, double voxel, double margin) {
 
 struct Scene {  // what the views share
   const MapScene& map;
-  const Axes& axes;
+  const MapAxes& axes;
   const Points& voxels;
   const Points& path;
   std::array<Interval, 3> box;
@@ -268,7 +238,7 @@ struct Stretched {
 /// Free, occupied and unknown on the upright surface through the path and the way ahead, stretched flat.
 Drawing upright_section(const Scene& scene) {
   const FlightEnd end = end_of_flight(scene.map.trajectory, scene.map.look);
-  const Stretched stretched(scene.path, along(end.direction, scene.axes));
+  const Stretched stretched(scene.path, scene.axes.along(end.direction));
   Drawing drawing{"Free, occupied and unknown space along the path, from the side",
                   {},
                   {0, stretched.length() + corridor_length, "distance flown, then straight ahead"},
@@ -299,12 +269,12 @@ std::size_t count_outside(const Scene& scene) {
 }
 
 /// The whole map where nothing is occupied, but something is free.
-Points corners_of_known(const mapping::OccupancyMap& map, const Axes& axes) {
+Points corners_of_known(const mapping::OccupancyMap& map, const MapAxes& axes) {
   const Eigen::AlignedBox3d box = map.bounds();
   if (box.isEmpty()) return {};
   Points corners;
   for (const auto corner : {Eigen::AlignedBox3d::BottomLeftFloor, Eigen::AlignedBox3d::TopRightCeil})
-    corners.push_back(along(Eigen::Vector3d(box.corner(corner)), axes));
+    corners.push_back(axes.along(box.corner(corner)));
   return corners;
 }
 
@@ -344,7 +314,7 @@ std::string section_ahead(const MapScene& map, const FlightEnd& end, const Eigen
 
 MapViews draw_map(const MapScene& map) {
   MapViews views;
-  const Axes axes = axes_of(map.up);
+  const MapAxes axes = map_axes(map.up);
   const Points voxels = occupied_voxels(map.map, axes);
   const Points path = thinned(along(map.trajectory, axes));
   const Points shown = voxels.empty() ? corners_of_known(map.map, axes) : voxels;

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "pade/io/formats/flow_picture.hpp"
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::evaluation {
 namespace {
@@ -62,28 +62,12 @@ const Table& table_of(Palette palette) {
 
 constexpr std::string_view kBase64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-std::string base64(const std::vector<unsigned char>& bytes) {
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0U);
-    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kBase64[group >> (18 - 6 * k) & 63U] : '=';
-  }
-  return text;
-}
-
-std::string data_uri(const cv::Mat& picture, int largest_width, int interpolation, std::string_view type,
-                     const std::vector<int>& parameters) {
-  cv::Mat fitted = picture;
-  if (picture.cols > largest_width) {
-    const double scale = static_cast<double>(largest_width) / picture.cols;
-    cv::resize(picture, fitted, {}, scale, scale, interpolation);
-  }
-  std::vector<unsigned char> bytes;
-  cv::imencode(fmt::format(".{}", type), fitted, bytes, parameters);
-  return fmt::format("data:image/{};base64,{}", type == "jpg" ? "jpeg" : type, base64(bytes));
+cv::Mat fitted(const cv::Mat& picture, int largest_width, int interpolation) {
+  if (picture.cols <= largest_width) return picture;
+  cv::Mat small;
+  const double scale = static_cast<double>(largest_width) / picture.cols;
+  cv::resize(picture, small, {}, scale, scale, interpolation);
+  return small;
 }
 
 template <std::size_t Classes>
@@ -101,6 +85,18 @@ cv::Mat colourise_classes(const cv::Mat& states, const std::array<std::string_vi
 }
 
 }  // namespace
+
+std::string base64(const std::vector<unsigned char>& bytes) {
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0U);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kBase64[group >> (18 - 6 * k) & 63U] : '=';
+  }
+  return text;
+}
 
 cv::Mat colourise(const cv::Mat& values, double from, double to, Palette palette) {
   const Table& table = table_of(palette);
@@ -159,12 +155,14 @@ std::string colour_bar(double from, double to, Palette palette, std::string_view
 std::string png_uri(const cv::Mat& picture, int largest_width, bool smooth) {
   // Areas of one colour: run lengths give files a seventh larger than level 9 does, in a twentieth of its
   // time.
-  return data_uri(picture, largest_width, smooth ? cv::INTER_AREA : cv::INTER_NEAREST, "png",
-                  {cv::IMWRITE_PNG_COMPRESSION, 6, cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE});
+  const cv::Mat shown = fitted(picture, largest_width, smooth ? cv::INTER_AREA : cv::INTER_NEAREST);
+  return "data:image/png;base64," +
+         base64(io::encode_png(shown, {.level = 6, .runs_only = true, .left_filter = false}));
 }
 
 std::string jpeg_uri(const cv::Mat& picture, int largest_width) {
-  return data_uri(picture, largest_width, cv::INTER_AREA, "jpg", {cv::IMWRITE_JPEG_QUALITY, 88});
+  return "data:image/jpeg;base64," +
+         base64(io::encode_jpeg(fitted(picture, largest_width, cv::INTER_AREA), 88));
 }
 
 std::string bytes_of_uri(std::string_view uri) {

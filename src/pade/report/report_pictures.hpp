@@ -6,6 +6,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -47,6 +48,8 @@ std::string png_uri(const cv::Mat& picture, int largest_width, bool smooth);
 /// The same as JPEG, for photographs.
 std::string jpeg_uri(const cv::Mat& picture, int largest_width);
 
+/// As text, padded (RFC 4648).
+std::string base64(const std::vector<unsigned char>& bytes);
 /// The file that such a URI holds; empty if it is none.
 std::string bytes_of_uri(std::string_view uri);
 

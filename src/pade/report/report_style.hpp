@@ -51,6 +51,9 @@ svg .end { fill: var(--orange); stroke: #fff; stroke-width: 1.5; }
 svg .scale { fill: none; stroke: #000; stroke-width: 2; }
 svg .corridor { fill: none; stroke: var(--orange); stroke-width: 1.6; stroke-dasharray: 5 3; }
 svg .plate { fill: #ffffffd9; }
+figure.map3d { margin: 0 0 16px; break-inside: avoid; }
+figure.map3d > div { height: min(70vh, 620px); background: #1d2226; color: #dfe4e8; border-radius: 4px; }
+figure.map3d > div > p:only-child { padding: 14px; }
 .wide { display: grid; gap: 14px; }
 .views { display: grid; grid-template-columns: 1fr 1fr; gap: 18px; align-items: start; }
 svg.timing { width: 100%; max-width: 860px; display: block; }
@@ -58,7 +61,7 @@ svg.timing { width: 100%; max-width: 860px; display: block; }
 .error { border-left: 4px solid #cc3311; background: #fbeae6; padding: 6px 12px; margin: 6px 0; }
 .good { border-left: 4px solid var(--blue); background: #eef5fa; padding: 6px 12px; margin: 6px 0; }
 @page { size: A4; margin: 12mm; }
-@media print { body { padding: 0; max-width: none; font-size: 11px; } h2 { break-after: avoid; } .tile b { font-size: 17px; }
+@media print { figure.map3d { display: none; } body { padding: 0; max-width: none; font-size: 11px; } h2 { break-after: avoid; } .tile b { font-size: 17px; }
   .views { break-inside: avoid; } tr { break-inside: avoid; } }
 @media (max-width: 760px) { .pictures { grid-template-columns: 1fr 1fr; } .views { grid-template-columns: 1fr; } body { padding: 16px; } }
 )css";

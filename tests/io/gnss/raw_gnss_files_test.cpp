@@ -127,6 +127,46 @@ TEST(RinexObservations, LeavesOutWhatIsCutOff) {
   }
 }
 
+/// RINEX 3.02 calls BeiDou's B1I 1I, the others 2I; 1X is B1C from 3.04 on.
+TEST(RinexObservations, BeidousFirstSignalHasOneName) {
+  const auto name = [](const std::string& version, const std::string& code) {
+    std::string text = obs_header(version) + epoch_line(42, 1) + "C08  38689403.653\n";
+    text.replace(text.find("R    2 C1C L1C"), 14, "C    1 C" + code + "    ");
+    const auto log = parsed(text);
+    const auto& found = log.epochs.at(0).signals.at(0).code;
+    return std::string(found.begin(), found.end());
+  };
+  EXPECT_EQ(name("3.02", "1I"), "2I");
+  EXPECT_EQ(name("3.02", "1Q"), "2Q");
+  EXPECT_EQ(name("3.02", "1X"), "2X");
+  EXPECT_EQ(name("3.04", "1I"), "2I");
+  EXPECT_EQ(name("3.04", "1X"), "1X");
+  EXPECT_EQ(name("3.04", "1P"), "1P");
+  EXPECT_EQ(name("3.03", "2I"), "2I");
+}
+
+/// A receiver that does not know the date yet may stamp its first epochs years ahead.
+TEST(RinexObservations, EpochsOfTheFutureDoNotCostTheRest) {
+  std::string future = "> 2031  6 29 11 12 41.0000000  0  1\n" + kG8;
+  std::string good;
+  for (int i = 0; i < 6; ++i) good += epoch_line(42 + i, 1) + kG8;
+  const auto first = parsed(obs_header() + future + good);
+  EXPECT_EQ(first.epochs.size(), 6U);
+  ASSERT_EQ(first.remarks.size(), 1U);
+  EXPECT_THAT(first.remarks[0], HasSubstr("a.obs: line 6: later than the epochs behind it, left out"));
+  const auto amid = parsed(obs_header() + epoch_line(41, 1) + kG8 + future + good);
+  EXPECT_EQ(amid.epochs.size(), 7U);
+  // Two hundred that lie behind a hundred are the majority, five behind ten are not.
+  const auto blocks = [&](int later, int earlier) {
+    std::string text = obs_header();
+    for (int i = 0; i < later; ++i) text += epoch_line(30 + 0.1 * i, 1) + kG8;
+    for (int i = 0; i < earlier; ++i) text += epoch_line(1 + 0.1 * i, 1) + kG8;
+    return parsed(text).epochs.size();
+  };
+  EXPECT_EQ(blocks(100, 200), 200U);
+  EXPECT_EQ(blocks(10, 5), 10U);
+}
+
 TEST(RinexObservations, SaysWhichVersionItFound) {
   EXPECT_THAT(refused(obs_header("2.11") + epoch_line(42, 1) + kG8),
               HasSubstr("a.obs: line 1: found RINEX version \"2.11\", expected 3.00 to 3.05"));
@@ -228,6 +268,54 @@ TEST(RinexNavigation, GalileosFNavHasItsOwnDelay) {
   const auto log = parsed_navigation(nav_header() + record("E12", 385200, 0, 258));
   EXPECT_TRUE(log.broadcast.kepler[0].second_choice);
   EXPECT_DOUBLE_EQ(log.broadcast.kepler[0].group_delay, -3e-9);
+}
+
+/// Blanks at the end of a line are no part of it: many programs cut them off, and the next line goes on in
+/// its own columns.
+TEST(RinexNavigation, ColumnsThatAreCutOffShiftNothing) {
+  const auto cut = [](const std::string& whole, std::size_t line, std::size_t values) {
+    std::size_t from = 0;
+    for (std::size_t i = 0; i < line; ++i) from = whole.find('\n', from) + 1;
+    const std::size_t end = whole.find('\n', from);
+    const std::size_t width = 4 + 19 * values;
+    return whole.substr(0, std::min(from + width, end)) + whole.substr(end);
+  };
+  // Galileo's spare behind its week, GPS's flag of L2 and then its issue of the clock, BeiDou's line of the
+  // accuracy.
+  const std::string galileo = cut(record("E12", 385200), 5, 3);
+  const std::string gps = cut(cut(record("G08", 385200), 5, 3), 6, 3);
+  const std::string beidou = cut(record("C30", 385200), 5, 1);
+  const auto log = parsed_navigation(nav_header() + galileo + gps + beidou);
+  EXPECT_TRUE(log.remarks.empty());
+  ASSERT_EQ(log.broadcast.kepler.size(), 3U);
+  EXPECT_DOUBLE_EQ(log.broadcast.kepler[0].group_delay, -4e-9);
+  EXPECT_DOUBLE_EQ(log.broadcast.kepler[1].group_delay, -3e-9);
+  EXPECT_DOUBLE_EQ(log.broadcast.kepler[2].group_delay, -3e-9);
+  for (const auto& e : log.broadcast.kepler) EXPECT_DOUBLE_EQ(e.accuracy, 3.12) << to_string(e.satellite);
+  // GLONASS does not need the age of its message.
+  const auto glonass = parsed_navigation(nav_header() + cut(glonass_record("2023 06 29 11 15 00"), 3, 3));
+  EXPECT_EQ(glonass.broadcast.glonass.size(), 1U);
+  // A delay that is needed and missing is not taken to be zero, nor one that no satellite has to be right.
+  gnss::RawLog none;
+  EXPECT_FALSE(
+      parse_rinex_navigation(nav_header() + cut(record("E12", 385200), 6, 3).substr(0, 540), "a", none));
+  std::string wild = record("E12", 385200);
+  wild.replace(wild.find("-4.000000000000E-09"), 19, " 3.859390000000E+05");
+  const Status status = parse_rinex_navigation(nav_header() + wild, "a", none);
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, HasSubstr("a group delay of 385939 s"));
+}
+
+/// Galileo's -1 and an accuracy of many kilometres promise nothing; 0 alone is what was not said.
+TEST(RinexNavigation, ASatelliteThatPromisesNothingIsNotTheBest) {
+  const auto accuracy = [](const std::string& value) {
+    std::string text = record("E12", 385200);
+    text.replace(text.find(" 3.120000000000E+00"), 19, value);
+    return parsed_navigation(nav_header() + text).broadcast.kepler.at(0).accuracy;
+  };
+  EXPECT_DOUBLE_EQ(accuracy("-1.000000000000E+00"), 8192);
+  EXPECT_DOUBLE_EQ(accuracy(" 3.276800000000E+04"), 8192);
+  EXPECT_DOUBLE_EQ(accuracy(" 0.000000000000E+00"), 0);
 }
 
 TEST(RinexNavigation, KnowsLeapSecondsAndTheEndOfTheWeek) {
@@ -336,6 +424,41 @@ TEST(RawGnssFolder, FindsItsFilesByTheirFirstLines) {
   EXPECT_EQ(one->epochs.size(), 1U);
   EXPECT_EQ(one->broadcast.kepler.size(), 1U);
   EXPECT_FALSE(read_raw_gnss(folder / "any.name"));
+}
+
+/// What one navigation file lacks another beside it may have.
+TEST(RawGnssFolder, OneNavigationFileThatGivesNothingIsNoFault) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder / "a.obs") << obs_header() + epoch_line(42, 1) + kG8;
+  std::ofstream(folder / "a.nav") << nav_header() + record("G08", 385200);
+  std::ofstream(folder / "b.nav") << nav_header() + record("J02", 385200);
+  std::ofstream(folder / "c.nav") << nav_header();
+  std::ofstream(folder / "d.nav") << nav_header("2.11") + record("G08", 385200);
+  const auto log = read_raw_gnss(folder.path());
+  ASSERT_TRUE(log) << log.error().message;
+  EXPECT_EQ(log->broadcast.kepler.size(), 1U);
+  ASSERT_EQ(log->remarks.size(), 3U);
+  EXPECT_THAT(log->remarks[0], HasSubstr("b.nav: no ephemeris of GPS, GLONASS, Galileo or BeiDou in it"));
+  EXPECT_THAT(log->remarks[1], HasSubstr("c.nav: no ephemeris"));
+  EXPECT_THAT(log->remarks[2], HasSubstr("found RINEX version \"2.11\""));
+  EXPECT_THAT(log->remarks[2], HasSubstr("left out"));
+  std::filesystem::remove(folder / "a.nav");
+  const auto none = read_raw_gnss(folder.path());
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message, HasSubstr("observations but no ephemeris"));
+  EXPECT_THAT(none.error().message, HasSubstr("found RINEX version \"2.11\""));
+}
+
+TEST(RawGnssFolder, SaysThatTheIonosphereIsNotKnown) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder / "a.obs") << obs_header() + epoch_line(42, 1) + kG8;
+  std::string nav = nav_header() + record("G08", 385200);
+  for (const char* label : {"GPSA", "GPSB"}) nav.replace(nav.find(label), 4, "GAL ");
+  std::ofstream(folder / "a.nav") << nav;
+  const auto log = read_raw_gnss(folder.path());
+  ASSERT_TRUE(log) << log.error().message;
+  ASSERT_EQ(log->remarks.size(), 1U);
+  EXPECT_THAT(log->remarks[0], HasSubstr("ionosphere"));
 }
 
 }  // namespace

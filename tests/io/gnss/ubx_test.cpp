@@ -151,6 +151,51 @@ TEST(Ubx, AShorterLockTimeIsALoss) {
   EXPECT_TRUE(log.epochs[2].signals[0].lost_lock);
 }
 
+/// Lost and found again between two epochs: the lock is younger than the epoch before.
+TEST(Ubx, ALockTimeYoungerThanTheEpochBeforeIsALoss) {
+  gnss::RawLog log;
+  ASSERT_TRUE(parse_ubx(
+      rawx(1, {{0, 8, 0, 400, 7}, {0, 9, 0, 64500, 7}}) + rawx(2, {{0, 8, 0, 700, 7}, {0, 9, 0, 64500, 7}}) +
+          rawx(3, {{0, 8, 0, 1700, 7}, {0, 9, 0, 64500, 7}}) + rawx(4, {{0, 9, 0, 64500, 7}}) +
+          rawx(5, {{0, 8, 0, 1800, 7}, {0, 9, 0, 64500, 7}}),
+      "a", log));
+  EXPECT_TRUE(log.epochs[1].signals[0].lost_lock);
+  EXPECT_FALSE(log.epochs[2].signals[0].lost_lock);
+  EXPECT_TRUE(log.epochs[4].signals[0].lost_lock);
+  for (const gnss::Epoch& epoch : log.epochs) EXPECT_FALSE(epoch.signals.back().lost_lock);
+}
+
+/// A capture of a serial line begins with NMEA, or amid a message.
+TEST(Ubx, IsKnownWhateverStandsBeforeItsFirstMessage) {
+  const std::string epoch = rawx(385962, {{0, 8, 0, 900, 7}});
+  EXPECT_EQ(raw_gnss_kind(epoch), RawGnssKind::ubx);
+  EXPECT_EQ(raw_gnss_kind("$GNGGA,,*00\r\n" + epoch), RawGnssKind::ubx);
+  EXPECT_EQ(raw_gnss_kind(epoch.substr(10) + epoch), RawGnssKind::ubx);
+  EXPECT_EQ(raw_gnss_kind(std::string(60000, 'x') + epoch), RawGnssKind::ubx);
+  std::string damaged = epoch;
+  damaged[40] = static_cast<char>(damaged[40] ^ 1);
+  EXPECT_FALSE(raw_gnss_kind("$GNGGA,,*00\r\n" + damaged));
+  EXPECT_FALSE(raw_gnss_kind("$GNGGA,,*00\r\n"));
+  // A recording of another kind that has such messages in it is not one of this kind.
+  for (const char* magic : {"#ROSBAG V2.0\n", "\x89MCAP0\r\n", "ULog\x01\x12\x35", "SQLite format 3"}) {
+    EXPECT_FALSE(raw_gnss_kind(magic + epoch)) << magic;
+  }
+}
+
+/// Subframes are of the week of the epochs that stay.
+TEST(Ubx, AnEpochOfTheFutureCostsNeitherTheRestNorTheEphemerides) {
+  const std::vector<Measured> one{{0, 8, 0, 900, 7}};
+  std::string good;
+  for (int i = 0; i < 6; ++i) good += rawx(385962 + i, one);
+  gnss::RawLog log;
+  ASSERT_TRUE(parse_ubx(rawx(100, one, 2700) + subframes(8, 31, -0.95) + good, "a.ubx", log));
+  EXPECT_EQ(log.epochs.size(), 6U);
+  ASSERT_EQ(log.broadcast.kepler.size(), 1U);
+  EXPECT_EQ(log.broadcast.kepler[0].toe.nanoseconds, (2268LL * 604800 + 388800) * 1'000'000'000);
+  ASSERT_EQ(log.remarks.size(), 1U);
+  EXPECT_THAT(log.remarks[0], HasSubstr("a.ubx: byte 0: later than the epochs behind it, left out"));
+}
+
 /// A checksum says nothing of the sense: found by fuzzing, where a time did not fit into its nanoseconds.
 TEST(Ubx, AWeekThatIsNotOfThisCenturyIsNamedAndLeftOut) {
   gnss::RawLog log;
@@ -174,7 +219,7 @@ TEST(Ubx, ABrokenChecksumIsNamedAndSurvived) {
   EXPECT_EQ(log.epochs.size(), 2U);
   ASSERT_EQ(log.remarks.size(), 2U);
   EXPECT_THAT(log.remarks[0], HasSubstr("a.ubx: the message at byte 56 has the checksum"));
-  EXPECT_THAT(log.remarks[1], HasSubstr("not later than the one before"));
+  EXPECT_THAT(log.remarks[1], HasSubstr("the time of the epoch before once more"));
   gnss::RawLog none;
   const Status status = parse_ubx(broken, "a.ubx", none);
   ASSERT_FALSE(status);

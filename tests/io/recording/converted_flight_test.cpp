@@ -255,6 +255,61 @@ TEST(ConvertedFlight, KeepsTheSensorsThatThereAre) {
   EXPECT_FALSE(fs::exists(folder / "copy/gnss.csv"));
 }
 
+/// "Any unit" in a table, tesla in a recording.
+TEST(ConvertedFlight, TheMagneticFieldIsInTeslaWhateverUnitItCameIn) {
+  const TemporaryFolder folder;
+  const TurnedImu turned;
+  turned.write(folder / "turned.mcap");
+  const auto original = Sequence::open(folder / "turned.mcap");
+  auto sensors = read_navigation_log(folder / "turned.mcap");
+  ASSERT_TRUE(original && sensors);
+  const Eigen::Vector3d tesla(2e-5, 1e-5, -4e-5);
+  struct Case {
+    double scale;
+    const char* note;
+  };
+  for (const Case& unit : {Case{1, "in tesla"}, Case{1e4, ""}, Case{1e6, "in microtesla"},
+                           Case{1e7, "in milligauss"}, Case{1e9, "in nanotesla"}, Case{2.5e4, "not known"}}) {
+    for (MagneticField& sample : sensors->magnetometer) sample.field = unit.scale * tesla;
+    const WrittenFlight written = convert(*original, &*sensors, folder / "unit.mcap");
+    const auto back = read_navigation_log(folder / "unit.mcap");
+    ASSERT_TRUE(back) << back.error().message;
+    ASSERT_FALSE(back->magnetometer.empty());
+    if (*unit.note == 0) {
+      EXPECT_THAT(written.notes, ::testing::Not(Contains(HasSubstr("magnetic")))) << unit.scale;
+    } else {
+      EXPECT_THAT(written.notes, Contains(HasSubstr(unit.note))) << unit.scale;
+    }
+    const double expected = unit.scale == 2.5e4 ? 2.5 : 1;
+    EXPECT_NEAR(back->magnetometer[0].field.norm(), expected * 1e4 * tesla.norm(), 1e-6) << unit.scale;
+  }
+}
+
+TEST(ConvertedFlight, PositionsWithoutAnOriginOnEarthAreSaid) {
+  const TemporaryFolder folder;
+  const TurnedImu turned;
+  turned.write(folder / "turned.mcap");
+  const auto original = Sequence::open(folder / "turned.mcap");
+  auto sensors = read_navigation_log(folder / "turned.mcap");
+  ASSERT_TRUE(original && sensors);
+  const auto notes = [&] { return convert(*original, &*sensors, folder / "out.mcap").notes; };
+  EXPECT_THAT(notes(), ::testing::Not(Contains(HasSubstr("no origin on Earth"))));
+  sensors->gnss.origin.reset();
+  EXPECT_THAT(notes(), Contains(HasSubstr("no origin on Earth")));
+}
+
+TEST(ConvertedFlight, AFolderKeepsTheGeographicOrigin) {
+  const TemporaryFolder folder;
+  const Sequence original =
+      test::opened_flight(folder / "flight", test::make_flight(), "geographic_origin: [47.25, 8.5, 432.1]\n");
+  convert(original, nullptr, folder / "copy");
+  const auto copy = Sequence::open(folder / "copy");
+  ASSERT_TRUE(copy) << copy.error().message;
+  ASSERT_TRUE(copy->calibration().origin);
+  EXPECT_EQ(*copy->calibration().origin, *original.calibration().origin);
+  EXPECT_EQ(copy->calibration().origin->latitude_deg, 47.25);
+}
+
 TEST(ConvertedFlight, ImagesBefore1970AreRefusedByName) {
   const TemporaryFolder folder;
   test::Flight flight = test::make_flight();

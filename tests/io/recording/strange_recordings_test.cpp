@@ -6,9 +6,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/recording/flight/recorded_frames.hpp"
 #include "pade/io/recording/flight/recorded_images.hpp"
@@ -184,8 +184,7 @@ void write_flight_messages(test::OwnRecording& own, const test::Flight& flight) 
 
 void write_compressed(test::OwnRecording& own, const std::string& topic, Time time, const std::string& format,
                       const cv::Mat& image) {
-  std::vector<unsigned char> png;
-  ASSERT_TRUE(cv::imencode(".png", image, png));
+  const auto png = encode_png(image);
   own.write(topic, "sensor_msgs/CompressedImage", time,
             write_compressed_image({time, "camera"}, format, std::string(png.begin(), png.end()), kEncoding));
 }
@@ -210,9 +209,7 @@ TEST(RecordedImages, AMosaicWithinAPictureIsColours) {
     ASSERT_TRUE(sequence) << sequence.error().message;
     const auto encoded = sequence->encoded_image(0);
     ASSERT_TRUE(encoded);
-    const cv::Mat bytes(1, static_cast<int>(encoded->bytes.size()), CV_8UC1,
-                        const_cast<char*>(encoded->bytes.data()));
-    const cv::Mat pixels = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+    const cv::Mat pixels = *decode_image(image_bytes(encoded->bytes), Pixels::stored);
     ImageMessage raw;
     raw.height = static_cast<std::uint32_t>(flight.camera.height);
     raw.width = raw.step = static_cast<std::uint32_t>(flight.camera.width);

@@ -7,9 +7,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/io/formats/flow_file.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/run/run_images.hpp"
 #include "pade/io/run/run_reader.hpp"
 #include "pade/io/run/run_writer.hpp"
@@ -244,7 +244,7 @@ TEST(RunFolderFiles, RefuseABoundThatTheDepthImagesDoNotHave) {
 
 TEST(RunFolderFiles, TurnABoundOfLessThanACountIntoNone) {
   const cv::Mat metres = (cv::Mat_<float>(1, 4) << 0.0099F, 0.0101F, 1e9F, kNaN);
-  const cv::Mat counts = cv::imdecode(encode_bounds(metres, 100), cv::IMREAD_UNCHANGED);
+  const cv::Mat counts = *decode_image(encode_bounds(metres, 100), Pixels::stored);
   EXPECT_EQ(counts.at<std::uint16_t>(0), 0);
   EXPECT_EQ(counts.at<std::uint16_t>(1), 1);
   EXPECT_EQ(counts.at<std::uint16_t>(2), 65535);
@@ -257,7 +257,7 @@ TEST(RunFolderFiles, SaturateButNeverTurnIntoNone) {
   metres.at<float>(1) = 1e9F;
   metres.at<float>(2) = std::numeric_limits<float>::infinity();
   metres.at<float>(3) = -1;
-  const cv::Mat counts = cv::imdecode(encode_metres(metres, 100), cv::IMREAD_UNCHANGED);
+  const cv::Mat counts = *decode_image(encode_metres(metres, 100), Pixels::stored);
   EXPECT_EQ(counts.at<std::uint16_t>(0), 1);
   EXPECT_EQ(counts.at<std::uint16_t>(1), 65535);
   EXPECT_EQ(counts.at<std::uint16_t>(2), 65535);

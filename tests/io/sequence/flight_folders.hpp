@@ -1,5 +1,5 @@
-// A short synthetic flight and its folder in each layout, written by the tests themselves (OpenCV and
-// printf), so that the readers are not checked against their own writer.
+// A short synthetic flight and its folder in each layout, written by the tests themselves (printf, and
+// pictures whose codec is held to OpenCV's), so that the readers are not checked against their own writer.
 #pragma once
 
 #include <cstdio>
@@ -10,12 +10,12 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "pade/core/camera.hpp"
 #include "pade/core/pose.hpp"
 #include "pade/core/time.hpp"
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::test {
 
@@ -33,7 +33,7 @@ inline std::string read_bytes(const fs::path& file) {
 
 inline void write_image(const fs::path& file, const cv::Mat& image) {
   fs::create_directories(file.parent_path());
-  ASSERT_TRUE(cv::imwrite(file.string(), image)) << file;
+  ASSERT_TRUE(io::save_image(file.string(), image)) << file;
 }
 
 struct Flight {

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/sequence/sequence.hpp"
 
 #include "io/sequence/flight_folders.hpp"

@@ -4,8 +4,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/sequence/sequence.hpp"
 
 namespace pade::io {
@@ -73,7 +73,7 @@ TEST(Mononav, EveryPixelOfTheBlackBorderIsMaskedAndLittleElse) {
   ASSERT_TRUE(sequence);
   cv::Mat brightest = cv::Mat::zeros(sequence->camera().size(), CV_8UC1);
   for (const auto& entry : fs::directory_iterator(folder / "rgb")) {
-    cv::max(brightest, cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE), brightest);
+    cv::max(brightest, *load_image(entry.path(), Pixels::grey), brightest);
   }
   const cv::Mat black = brightest == 0;
   EXPECT_GT(cv::countNonZero(black), 0.03 * static_cast<double>(black.total()));

@@ -14,13 +14,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
-#include <opencv2/imgcodecs.hpp>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/timerfd.h>
 #include <time.h>
 #include <unistd.h>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/camera/v4l2_source.hpp"
 
@@ -55,8 +55,7 @@ struct FakeDevice {
       for (std::size_t i = 0; i < used; ++i) buffer[i] = i % 2 == 0 ? 200 : 128;
     }
     if (format == V4L2_PIX_FMT_MJPEG) {
-      std::vector<std::uint8_t> jpeg;
-      cv::imencode(".jpg", cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar(10, 20, 200)), jpeg);
+      const auto jpeg = pade::io::encode_jpeg(cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar(10, 20, 200)));
       std::copy(jpeg.begin(), jpeg.end(), buffer.begin());
       used = static_cast<std::uint32_t>(jpeg.size());
     }

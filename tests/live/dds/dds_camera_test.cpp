@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/recording/messages/message_writer.hpp"
 #include "pade/live/config.hpp"
 
@@ -62,8 +62,7 @@ TEST_F(DdsCameraTest, ReadsPicturesThatAreCompressed) {
   const auto camera = open("/camera/image_raw/compressed");
   EXPECT_EQ(network_.topics.types["/camera/image_raw/compressed"], "sensor_msgs/CompressedImage");
   const cv::Mat image = image_of_wall(textured_wall(), 1);
-  std::vector<unsigned char> file;
-  ASSERT_TRUE(cv::imencode(".png", image, file));
+  const auto file = io::encode_png(image);
   network_.topics.give("/camera/image_raw/compressed",
                        io::write_compressed_image(now(), "mono8; png compressed ",
                                                   std::string(file.begin(), file.end()), kCameraTestCdr));

@@ -95,5 +95,35 @@ TEST(MessageClock, StampsOfAnotherClockAreRefusedUnlessARecordingIsPlayed) {
   EXPECT_EQ(played.restarts(), 1U) << "it begins anew";
 }
 
+TEST(MessageClock, ARecordingMayBePlayedAtAnyPaceAndPause) {
+  constexpr std::int64_t kPeriod = 50'000'000, kMinute = 60'000'000'000;
+  for (const double pace : {0.1, 0.5, 0.8, 1.0, 2.0, 10.0}) {
+    std::int64_t moved = 0;
+    MessageClock clock(StampClock::played, still_clocks(moved));
+    const Time first{1'500'000'000'000'000'000};
+    const auto begun = clock.to_ours(first);
+    ASSERT_TRUE(begun);
+    for (std::int64_t told = kPeriod; told < kMinute; told += kPeriod) {
+      moved = static_cast<std::int64_t>(static_cast<double>(told) / pace);
+      const auto ours = clock.to_ours({first.nanoseconds + told});
+      ASSERT_TRUE(ours);
+      ASSERT_EQ(ours->nanoseconds - begun->nanoseconds, told) << "as it tells them, at pace " << pace;
+      ASSERT_EQ(clock.to_stamp(*ours).nanoseconds, first.nanoseconds + told);
+      // By what the newest lies behind, no more and no less than on its way: 30 ms and a tenth of a second.
+      ASSERT_NEAR(seconds_between(*ours, clock.now()) - clock.behind(), 0.03, 0.1) << pace;
+    }
+    EXPECT_EQ(clock.restarts(), 0U) << pace;
+    moved += 3'000'000'000;  // a pause
+    ASSERT_TRUE(clock.to_ours({first.nanoseconds + kMinute}));
+    EXPECT_EQ(clock.restarts(), 0U) << pace;
+    ASSERT_TRUE(clock.to_ours({first.nanoseconds + 2 * kMinute}));
+    EXPECT_EQ(clock.restarts(), 1U) << "somebody went on to another place of it, at pace " << pace;
+    const auto now = clock.to_ours({first.nanoseconds});
+    ASSERT_TRUE(now);
+    EXPECT_EQ(clock.restarts(), 2U) << "it begins anew, at pace " << pace;
+    EXPECT_NEAR(seconds_between(*now, clock.now()), 0.03, 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace pade::live

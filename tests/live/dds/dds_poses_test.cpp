@@ -93,11 +93,46 @@ TEST_F(DdsPosesTest, AJumpIsWhatTheMotionBeforeDoesNotLeadTo) {
   give(0.33, {5.0 + 0.5, 0, 0}, 0.5);  // half a metre off
   EXPECT_EQ(poses->at(at(0.33)).jumps, 1U);
   EXPECT_EQ(poses->at(at(0.3)).kind, Kind::never) << "what was before is of another map";
-  give(0.363, {6, 0, 0}, 0.9);  // 0.4 rad in 33 ms, then the other way
-  give(0.396, {6.5, 0, 0}, 0.55);
-  EXPECT_EQ(poses->at(at(0.396)).jumps, 2U);
-  give(0.43, {7, 0, 0}, 0.55, "map");
-  EXPECT_EQ(poses->at(at(0.43)).jumps, 3U) << "another frame";
+  for (int i = 1; i < 4; ++i) give(0.33 + 0.033 * i, {5.5 + 0.5 * i, 0, 0}, 0.5);
+  EXPECT_EQ(poses->at(at(0.42)).jumps, 1U);
+  give(0.462, {7.5, 0, 0}, 0.9);  // 0.4 rad in 33 ms
+  EXPECT_EQ(poses->at(at(0.462)).jumps, 2U);
+  give(0.495, {8, 0, 0}, 0.9, "map");
+  EXPECT_EQ(poses->at(at(0.495)).jumps, 3U) << "another frame";
+}
+
+/// A simultaneous localisation and mapping that has lost its way begins elsewhere, after a silence.
+TEST_F(DdsPosesTest, AJumpInASilenceIsOneToo) {
+  const auto poses = open();
+  for (const double silence : {0.6, 5.0}) {
+    const std::size_t before = poses->jumps();
+    for (int i = 0; i < 10; ++i) {
+      moved_ += 50'000'000;
+      start_.nanoseconds += 50'000'000;
+      give(0, {0.05 * i, 0, 0});
+    }
+    (void)poses->newest();
+    EXPECT_LE(poses->jumps(), before + 1) << "only that back to the start of this test";
+    const std::size_t then = poses->jumps();
+    moved_ += static_cast<std::int64_t>(silence * 1e9);
+    start_.nanoseconds += static_cast<std::int64_t>(silence * 1e9);
+    give(0, {0.5, 5, 0});
+    (void)poses->newest();
+    EXPECT_EQ(poses->jumps(), then + 1) << silence;
+  }
+}
+
+/// A bridge of another middleware hands 200 Hz on two by two, and stamps them then.
+TEST_F(DdsPosesTest, StampsAtArrivalInPairsAreNoJumps) {
+  const auto poses = open();
+  for (int i = 0; i < 400; ++i) {
+    if (i % 2 == 0) moved_ += 10'000'000;
+    if (i % 2 == 0) start_.nanoseconds += 10'000'000;
+    give(i % 2 == 0 ? -0.0001 : 0, {0.01 * i, 0, 0});
+    (void)poses->newest();
+  }
+  EXPECT_EQ(poses->jumps(), 0U);
+  EXPECT_EQ(poses->count(), 400U);
 }
 
 TEST_F(DdsPosesTest, WhatCannotBeUsedIsLeftOutAndSaid) {

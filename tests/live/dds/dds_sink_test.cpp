@@ -145,8 +145,45 @@ TEST_F(DdsSinkTest, FramesHaveTheStampsAndNamesOfThoseThatCame) {
 
 TEST_F(DdsSinkTest, SaysNothingOfFramesThatOthersSpeakOf) {
   states_body_ = states_camera_ = false;
+  shared_.names.set_world("odom");
+  for (const char* const topic : {"/tf", "/octomap_binary", "/octomap_point_cloud_centers", "/pade/path"})
+    topics_.subscribe(topic, 1);
   start();
-  EXPECT_FALSE(topics_.types.contains("/tf"));
+  world_.give(*sink_, 3, {0, 0, 1});
+  ASSERT_TRUE(topics_.await_count("/octomap_binary", 1));
+  EXPECT_THAT(topics_.of("/tf"), IsEmpty());
+  // But where the map is that has an origin of its own, nobody else can say.
+  world_.begin_anew(*sink_);
+  world_.origin = {500'000, -3, 7};
+  world_.give(*sink_, 3, {0, 0, 1});
+  ASSERT_TRUE(topics_.await_count("/tf", 1));
+  const auto transforms = io::read_transforms(topics_.of("/tf").back(), kSinkTestCdr);
+  ASSERT_TRUE(transforms.ok());
+  ASSERT_EQ(transforms->size(), 1U);
+  EXPECT_EQ((*transforms)[0].header.frame, "odom");
+  EXPECT_EQ((*transforms)[0].child, "pade_map");
+  EXPECT_EQ((*transforms)[0].position, world_.origin);
+  for (const char* const topic : {"/octomap_binary", "/octomap_point_cloud_centers", "/pade/path"}) {
+    for (int i = 0; i < 1000; ++i) {
+      const auto header = io::read_header(topics_.of(topic).back(), kSinkTestCdr);
+      ASSERT_TRUE(header);
+      if (header->frame == "pade_map") break;
+      ASSERT_LT(i, 999) << topic << " stays in " << header->frame;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
+}
+
+TEST_F(DdsSinkTest, WhatAFrameThatWasLeftOutMadeTheMapForgetIsPublished) {
+  topics_.subscribe("/octomap_binary", 1);
+  start();
+  world_.give(*sink_, 3, {0, 0, 1});
+  ASSERT_TRUE(topics_.await_count("/octomap_binary", 1));
+  world_.forget(*sink_);
+  ASSERT_TRUE(topics_.await_count("/octomap_binary", 2));
+  EXPECT_EQ(read_octomap(topics_.of("/octomap_binary").back()).data,
+            data_of(io::bytes_of(io::encode_map(world_.map(), io::MapFormat::bt))));
+  EXPECT_NE(topics_.of("/octomap_binary").back(), topics_.of("/octomap_binary").front());
 }
 
 TEST_F(DdsSinkTest, TopicsOfANamespaceAreItsOwnButForThoseThatAllShare) {

@@ -1,86 +1,14 @@
 // Looks at the page in headless Chromium while build/tests/live/web_session runs, and compares what it shows with
 // health.json and with the messages themselves. scripts/web-oracle starts it: PROGRAM FLIGHT PICTURE.
 const { spawn } = require('child_process')
-const fs = require('fs')
-const http = require('http')
-const os = require('os')
-const path = require('path')
-const WebSocket = require('ws')
+const { Browser, get, sleep, until } = require('./browser.js')
 
 const [program, flight, picture] = process.argv.slice(2)
 const port = 18765
-const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms))
 let bad = 0
 function check (what, good, text) {
   if (!good) ++bad
   console.log(`${good ? 'ok  ' : 'BAD '} ${what}: ${text}`)
-}
-
-function get (url) {
-  return new Promise((resolve, reject) => http.get(url, (answer) => {
-    let body = ''
-    answer.on('data', (part) => { body += part })
-    answer.on('end', () => resolve(body))
-  }).on('error', reject))
-}
-
-/// Waits until something is so; null after so many seconds.
-async function until (seconds, question) {
-  for (const end = Date.now() + 1000 * seconds; Date.now() < end; await sleep(20)) {
-    const answer = await question()
-    if (answer) return answer
-  }
-  return null
-}
-
-class Browser {
-  async open (url) {
-    this.folder = fs.mkdtempSync(path.join(os.tmpdir(), 'pade-page-'))
-    this.process = spawn('chromium', ['--headless=new', '--no-sandbox', '--use-gl=angle',
-      '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--window-size=1200,1000', '--remote-debugging-port=0',
-      `--user-data-dir=${this.folder}`, 'about:blank'], { stdio: 'ignore' })
-    const file = path.join(this.folder, 'DevToolsActivePort')
-    const found = await until(60, () => fs.existsSync(file) && fs.readFileSync(file, 'utf8').split('\n')[0])
-    const pages = JSON.parse(await get(`http://127.0.0.1:${found}/json`))
-    this.socket = new WebSocket(pages.find((page) => page.type === 'page').webSocketDebuggerUrl)
-    await new Promise((resolve) => this.socket.on('open', resolve))
-    this.waiting = new Map()
-    this.errors = []
-    this.count = 0
-    this.socket.on('message', (text) => {
-      const message = JSON.parse(text)
-      if (message.method === 'Runtime.exceptionThrown') this.errors.push(message.params.exceptionDetails)
-      if (this.waiting.has(message.id)) this.waiting.get(message.id)(message.result)
-    })
-    await this.tell('Runtime.enable')
-    await this.tell('Page.enable')
-    await this.tell('Page.navigate', { url })
-  }
-
-  tell (method, params = {}) {
-    const id = ++this.count
-    return new Promise((resolve) => {
-      this.waiting.set(id, resolve)
-      this.socket.send(JSON.stringify({ id, method, params }))
-    })
-  }
-
-  async value (expression) {
-    const answer = await this.tell('Runtime.evaluate', { expression, returnByValue: true })
-    return answer.result.value
-  }
-
-  async shot (file) {
-    const { data } = await this.tell('Page.captureScreenshot', { format: 'png' })
-    fs.writeFileSync(file, Buffer.from(data, 'base64'))
-  }
-
-  close () {
-    if (this.socket) this.socket.close()
-    if (this.process) this.process.kill()
-    if (!this.process) return
-    this.process.on('exit', () => setTimeout(() => fs.rmSync(this.folder, { recursive: true, force: true, maxRetries: 10, retryDelay: 200 }), 2000))
-  }
 }
 
 const shown = `(() => {
@@ -123,7 +51,7 @@ async function main () {
   check('3-D view', page.note === '', page.note || 'drawn')
   await browser.value(`window.setInterval(() => {
     const state = document.getElementById('state').textContent
-    if (!window.seenAt && state === 'no image from the camera') window.seenAt = Date.now()
+    if (!window.seenAt && state.startsWith('no image')) window.seenAt = Date.now()
     const old = document.getElementById('obstacles').className === 'old'
     if (old && !window.wasOld) window.oldAt = Date.now()
     window.wasOld = old
@@ -141,7 +69,7 @@ async function main () {
     const now = await browser.value(shown)
     const values = Object.entries(json.values)
     const equal = values.every(([key, value]) => now.rows.some(([name, text]) => name === key.replace(/_/g, ' ') && text === value))
-    return equal && now.state === json.message && String(now.voxels) === json.values.voxels_occupied ? values.length : 0
+    return equal && (now.state === json.message || now.state.startsWith('no image for')) && String(now.voxels) === json.values.voxels_occupied ? values.length : 0
   })
   check('health is that of health.json', same, `${same} values, voxels among them`)
   // The pictures last: without a graphics card they can take the browser a minute.

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/recording/messages/message_definitions.hpp"
 #include "pade/live/web/pictures.hpp"
 #include "pade/live/web/thinned_path.hpp"
@@ -94,9 +94,51 @@ TEST(WebMessages, SayWhatTheMapperSaid) {
   EXPECT_EQ(info["k"].list[0].number, 60);
   for (const WebChannel channel : {WebChannel::camera, WebChannel::obstacles, WebChannel::depth_picture}) {
     const std::string file = client.next(bed.publisher, channel)["data"].text;
-    const cv::Mat picture = cv::imdecode(std::vector<char>(file.begin(), file.end()), cv::IMREAD_COLOR);
+    const cv::Mat picture = *io::decode_image(io::image_bytes(file), io::Pixels::colour);
     EXPECT_EQ(picture.size(), cv::Size(96, 64)) << static_cast<int>(channel);
   }
+}
+
+/// Far from the origin of the poses a map has an origin of its own, which is said by a transform.
+TEST(WebMessages, OfAMapWithAnOriginOfItsOwnAreInItsFrame) {
+  PublisherBed bed;
+  bed.world.origin = {500'000, 2, 0};
+  bed.world.give(bed.publisher, 2, {1, 0, 0});
+  Follower client;
+  for (const WebChannel channel : {WebChannel::cloud, WebChannel::path}) {
+    EXPECT_EQ(client.next(bed.publisher, channel)["header"]["frame_id"].text, "pade_map");
+  }
+  bed.publisher.refresh({}, true);
+  const Decoded voxels = client.next(bed.publisher, WebChannel::voxels)["markers"];
+  ASSERT_FALSE(voxels.list.empty());
+  EXPECT_EQ(voxels.list.back()["header"]["frame_id"].text, "pade_map");
+  const Decoded transforms = client.next(bed.publisher, WebChannel::transforms)["transforms"];
+  ASSERT_EQ(transforms.list.size(), 3U);
+  EXPECT_EQ(transforms.list[0]["header"]["frame_id"].text, "pade_map");
+  EXPECT_EQ(transforms.list[0]["child_frame_id"].text, "base_link");
+  EXPECT_EQ(transforms.list[1]["header"]["frame_id"].text, "map");
+  EXPECT_EQ(transforms.list[1]["child_frame_id"].text, "pade_map");
+  EXPECT_EQ(transforms.list[1]["transform"]["translation"]["x"].number, 500'000);
+  EXPECT_EQ(transforms.list[1]["transform"]["rotation"]["w"].number, 1);
+}
+
+/// An image of depth is of the size that its calibration states, whatever windows the mapper has.
+TEST(WebMessages, DepthInCellsIsOnThePixelsOfTheCamera) {
+  PublisherBed bed({90, 62});
+  bed.world.window = 4;
+  bed.world.give(bed.publisher, 2, {0, 0, 0});
+  Follower client;
+  const Decoded info = client.next(bed.publisher, WebChannel::camera_info);
+  for (const WebChannel channel : {WebChannel::depth, WebChannel::sigma}) {
+    const Decoded image = client.next(bed.publisher, channel);
+    EXPECT_EQ(image["width"].number, info["width"].number);
+    EXPECT_EQ(image["height"].number, info["height"].number);
+    const cv::Mat pixels(62, 90, CV_32FC1, const_cast<char*>(image["data"].text.data()));
+    EXPECT_TRUE(std::isnan(pixels.at<float>(61, 19)));
+    EXPECT_NEAR(pixels.at<float>(61, 20), channel == WebChannel::depth ? 2 : 0.1, 1e-6);
+    EXPECT_NEAR(pixels.at<float>(0, 89), channel == WebChannel::depth ? 2 : 0.1, 1e-6);
+  }
+  EXPECT_EQ(client.next(bed.publisher, WebChannel::cloud)["width"].number, 18 * 16);
 }
 
 TEST(WebMessages, SectorsKeepFreeAndUnknownApart) {

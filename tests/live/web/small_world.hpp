@@ -30,12 +30,15 @@ class SmallWorld {
     for (double* const value : {&camera_.fx, &camera_.fy, &camera_.cx, &camera_.cy}) *value *= scale;
     mapping::MapOptions options;
     options.looks_baseline = 0;  // one look is enough
+    options.forget_after = 30;
     renew(options);
     mapped_.reference.image = cv::Mat(size, CV_8UC1, cv::Scalar(90));
   }
   [[nodiscard]] const Camera& camera() const { return camera_; }
   [[nodiscard]] const mapping::OccupancyMap& map() const { return *map_; }
 
+  int window = 1;                                    ///< of the depth
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the map
   /// A wall so far ahead, seen from a place of the body.
   void give(Sink& sink, double distance, const Eigen::Vector3d& place) {
     LiveUpdate update;
@@ -43,10 +46,13 @@ class SmallWorld {
     update.T_world_body.translation = place;
     const Pose T_world_camera = camera_pose(update.T_world_body, forward_mounting());
     mapped_.depth.time = update.time;
-    mapped_.depth.depth = cv::Mat(camera_.size(), CV_32FC1, cv::Scalar(distance));
-    mapped_.depth.depth.colRange(0, camera_.width / 4) = NAN;
-    mapped_.depth.variance = cv::Mat(camera_.size(), CV_32FC1, cv::Scalar(0.01));
-    mapped_.depth.variance.colRange(0, camera_.width / 4) = NAN;
+    mapped_.depth.window = window;
+    const cv::Size cells((camera_.width + window - 1) / window, (camera_.height + window - 1) / window);
+    mapped_.depth.depth = cv::Mat(cells, CV_32FC1, cv::Scalar(distance));
+    mapped_.depth.depth.colRange(0, cells.width / 4) = NAN;
+    mapped_.depth.variance = cv::Mat(cells, CV_32FC1, cv::Scalar(0.01));
+    mapped_.depth.variance.colRange(0, cells.width / 4) = NAN;
+    update.origin = origin;
     mapped_.reference.T_world_camera = T_world_camera;
     mapped_.change = map_->integrate(mapped_.depth, camera_, T_world_camera);
     view_ = view_ ? view_->after(*map_, mapped_.change) : mapping::MapView::of(*map_);
@@ -55,6 +61,12 @@ class SmallWorld {
     update.image = mapped_.reference.image.clone();
     update.mapped = &mapped_;
     sink.take(update);
+  }
+  /// A minute passes in which nothing is mapped.
+  void forget(Sink& sink) {
+    const mapping::MapChange change = map_->forget({mapped_.depth.time.nanoseconds + 60'000'000'000});
+    view_ = view_->after(*map_, change);
+    sink.forget(view_, change);
   }
   /// The map is empty again.
   void begin_anew(Sink& sink) {

@@ -78,14 +78,14 @@ TEST(WebOptions, TheNetworkNeedsAToken) {
     WebOptions options;
     const char* named;
   } cases[] = {
-      {{8765, "0.0.0.0", "", "", ""}, "web.token: found none"},
-      {{8765, "192.0.2.7", "", "", ""}, "web.token: found none"},
-      {{8765, "0.0.0.0", "short", "", ""}, "web.token: found 5 characters"},
-      {{8765, "0.0.0.0", "0123456789abcde&", "", ""}, "some of them other ones"},
-      {{8765, "localhost", "", "", ""}, "web.address: found \"localhost\""},
-      {{70'000, "127.0.0.1", "", "", ""}, "web.port"},
-      {{8765, "127.0.0.1", "", "foxglove.dev", ""}, "web.origins: found \"foxglove.dev\""},
-      {{8765, "127.0.0.1", "", "https://a.example/", ""}, "web.origins"},
+      {{8765, "0.0.0.0", "", ""}, "web.token: found none"},
+      {{8765, "192.0.2.7", "", ""}, "web.token: found none"},
+      {{8765, "0.0.0.0", "short", ""}, "web.token: found 5 characters"},
+      {{8765, "0.0.0.0", "0123456789abcde&", ""}, "some of them other ones"},
+      {{8765, "localhost", "", ""}, "web.address: found \"localhost\""},
+      {{70'000, "127.0.0.1", "", ""}, "web.port"},
+      {{8765, "127.0.0.1", "", "foxglove.dev"}, "web.origins: found \"foxglove.dev\""},
+      {{8765, "127.0.0.1", "", "https://a.example/"}, "web.origins"},
   };
   for (const auto& c : cases) {
     const Status status = check(c.options);
@@ -93,8 +93,8 @@ TEST(WebOptions, TheNetworkNeedsAToken) {
     EXPECT_THAT(status.error().message, HasSubstr(c.named));
   }
   EXPECT_TRUE(check(WebOptions{}));
-  EXPECT_TRUE(check(WebOptions{0, "::1", "", "", ""}));
-  EXPECT_TRUE(check(WebOptions{8765, "0.0.0.0", kToken, "https://app.foxglove.dev http://ground:8080", ""}));
+  EXPECT_TRUE(check(WebOptions{0, "::1", "", ""}));
+  EXPECT_TRUE(check(WebOptions{8765, "0.0.0.0", kToken, "https://app.foxglove.dev http://ground:8080"}));
 }
 
 TEST(FoxgloveRequest, SubscribesAndUnsubscribes) {

@@ -24,6 +24,7 @@
 namespace pade::live {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -112,13 +113,12 @@ TEST_F(WebServerTest, AsksForItsToken) {
 }
 
 TEST_F(WebServerTest, ServesThePageAndItsFiles) {
-  WebOptions options;
-  options.three = __FILE__;
-  open(options);
+  open();
   if (IsSkipped()) return;
-  EXPECT_THAT(answer({.path = "/", .upgrade = false}), HasSubstr("page.js"));
+  EXPECT_THAT(answer({.path = "/", .upgrade = false}), AllOf(HasSubstr("page.js"), HasSubstr("view_3d.js")));
   EXPECT_THAT(answer({.path = "/page.js", .upgrade = false}), HasSubstr("text/javascript"));
-  EXPECT_THAT(answer({.path = "/three.min.js", .upgrade = false}), HasSubstr("text/javascript"));
+  EXPECT_THAT(answer({.path = "/view_3d.js", .upgrade = false}),
+              AllOf(HasSubstr("text/javascript"), HasSubstr("class View3d")));
   EXPECT_THAT(answer({.path = "/../etc/passwd", .upgrade = false}), HasSubstr(" 404 "));
   EXPECT_THAT(answer({.path = "/health.json", .host = "evil.example", .upgrade = false}), HasSubstr(" 403 "));
   std::string json;

@@ -22,30 +22,36 @@ bool is_blocked(Occupancy state, UnknownSpace unknown) {
   return state == Occupancy::occupied || (state == Occupancy::unknown && unknown == UnknownSpace::blocked);
 }
 
-TEST(DistanceField, HasTheDistanceToTheNearestOfAllVoxels) {
-  const OccupancyMap map = random_map(11);
+/// Against a search of all voxels.
+void expect_distances(const OccupancyMap& map, const AlignedBox3d& box, double most) {
   const auto view = MapView::of(map);
-  const AlignedBox3d box(Vector3d(-1.5, -1, -0.7), Vector3d(1.2, 1.3, 0.6));
-  constexpr double kMost = 0.8;
   for (const UnknownSpace unknown : {UnknownSpace::blocked, UnknownSpace::free}) {
-    const DistanceField field = DistanceField::of(*view, box, unknown, kMost);
+    const DistanceField field = DistanceField::of(*view, box, unknown, most);
     std::vector<Vector3d> blocked;
     Vector3i v;
     for (v.z() = 0; v.z() < field.size().z(); ++v.z())
       for (v.y() = 0; v.y() < field.size().y(); ++v.y())
         for (v.x() = 0; v.x() < field.size().x(); ++v.x())
           if (is_blocked(map.at(field.centre(v)), unknown)) blocked.push_back(field.centre(v));
-    ASSERT_FALSE(blocked.empty());
     std::mt19937_64 random(11);
     for (int i = 0; i < 1000; ++i) {
       for (int axis = 0; axis < 3; ++axis)
         v[axis] = std::uniform_int_distribution<int>(0, field.size()[axis] - 1)(random);
-      double nearest = kMost;
+      double nearest = most;
       for (const Vector3d& other : blocked) nearest = std::min(nearest, (other - field.centre(v)).norm());
       ASSERT_NEAR(field.at(v), nearest, 1e-9) << v.transpose();
       ASSERT_NEAR(field.distance(field.centre(v)), nearest, 1e-9);
     }
   }
+}
+
+TEST(DistanceField, HasTheDistanceToTheNearestOfAllVoxels) {
+  const OccupancyMap map = random_map(11);
+  expect_distances(map, {Vector3d(-1.5, -1, -0.7), Vector3d(1.2, 1.3, 0.6)}, 0.8);
+  expect_distances(map, {Vector3d(-0.9, -2, -0.7), Vector3d(1.3, -1, 0.6)}, 20);  // more than 16 bits hold
+  const double end = 3276.8;                                                      // of what can be addressed
+  expect_distances(map, {Vector3d(end - 1, -1, -0.5), Vector3d(end + 9, 0, 0.5)}, 1.5);
+  expect_distances(map, {Vector3d(-1, -1, -end - 9), Vector3d(0, 0, 1 - end)}, 1.5);
 }
 
 TEST(DistanceField, RisesAlongItsGradient) {

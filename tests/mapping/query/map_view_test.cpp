@@ -52,6 +52,46 @@ TEST(MapView, SaysOfEachPointWhatTheOctreeSays) {
   }
 }
 
+TEST(MapView, SaysItOfLargeMapsAndAtTheBorderToo) {
+  const double border = 3276.8;
+  // Places that are known: near each other, too far apart for an index of tiles, for one of groups, and at
+  // the border of what can be addressed, where a place below it is rounded to the first voxel.
+  const std::vector<std::vector<Vector3d>> maps{
+      {{0, 0, 0}, {7, 3, 1}},
+      {{0, 0, 0}, {200, 200, 200}},
+      {{-300, -300, -300}, {300, 300, 300}},
+      {Vector3d::Constant(0.05 - border), {0.05 - border, 1 - border, 2 - border}},
+      {Vector3d::Constant(border - 0.05), {border - 1, border - 0.05, 0}}};
+  std::mt19937_64 random(5);
+  for (const auto& places : maps) {
+    auto tree = std::make_unique<octomap::OcTree>(0.1);
+    for (const Vector3d& place : places)
+      for (int i = 0; i < 400; ++i) {
+        const Vector3d at = random_in({place.array() - 0.8, place.array() + 0.8}, random);
+        tree->setNodeValue(at.x(), at.y(), at.z(), i % 3 == 0 ? 2.0F : -1.0F);
+      }
+    tree->updateInnerOccupancy();
+    const OccupancyMap map = std::move(OccupancyMap::create({}, std::move(tree))).value();
+    const auto view = MapView::of(map);
+    int known = 0;
+    for (const Vector3d& place : places)
+      for (int i = 0; i < 2000; ++i) {
+        Vector3d at = random_in({place.array() - 1, place.array() + 1}, random);
+        if (i % 4 == 0) at = (10 * at).array().round() / 10;  // corners of voxels
+        expect_same(*view, map, at);
+        known += view->at(at) == Occupancy::unknown ? 0 : 1;
+        at[i % 3] = i % 2 == 0 ? std::nan("") : -1e300;
+        EXPECT_EQ(view->at(at), Occupancy::unknown);
+      }
+    EXPECT_GT(known, 20);
+    for (int axis = 0; axis < 3; ++axis) {
+      Vector3d below = places[0];
+      below[axis] = -border - 0.05;
+      EXPECT_EQ(view->at(below), Occupancy::unknown);
+    }
+  }
+}
+
 TEST(MapView, AfterEachFrameIsWhatItWouldBeMadeAnewAndTheOldOneStays) {
   const simulation::AnalyticFlight flight =
       *simulation::make_analytic_flight("courtyard", 5, simulation::analytic_camera(96, 72));

@@ -51,7 +51,26 @@ TEST(Troposphere, IsSomeTwoMetresAndAHalfInTheZenith) {
   EXPECT_NEAR(troposphere_delay(sea, {0, M_PI / 6}), 2 * troposphere_delay(sea, {0, M_PI / 2}), 0.02);
   EXPECT_LT(troposphere_delay({0.8, 0, 3000}, {0, M_PI / 2}), 0.75 * troposphere_delay(sea, {0, M_PI / 2}));
   EXPECT_EQ(troposphere_delay(sea, {0, -0.1}), 0);
-  EXPECT_EQ(troposphere_delay({0.8, 0, 20000}, {0, 1}), 0);
+}
+
+TEST(Troposphere, FallsWithTheHeightWithoutAStep) {
+  const Direction zenith{0, M_PI / 2};
+  double last = troposphere_delay({0.8, 0, -1000}, zenith);
+  EXPECT_LT(last, 3);
+  for (double height = -999; height < 6e4; height += 1) {
+    const double delay = troposphere_delay({0.8, 0, height}, zenith);
+    ASSERT_LT(delay, last) << height;
+    ASSERT_GT(delay, last - 1e-3) << height;
+    last = delay;
+  }
+  EXPECT_NEAR(troposphere_delay({0.8, 0, 11000}, zenith), 0.52, 0.01);    // 226 hPa
+  EXPECT_NEAR(troposphere_delay({0.8, 0, 20000}, zenith), 0.126, 0.003);  // 55 hPa
+  EXPECT_LT(last, 1e-3);
+  for (const double height : {-6e6, -1e4, 4e4, 1e5, 3.6e6, 1e9}) {
+    const double delay = troposphere_delay({0.8, 0, height}, zenith);
+    EXPECT_GE(delay, 0) << height;
+    EXPECT_LT(delay, 3) << height;
+  }
 }
 
 }  // namespace

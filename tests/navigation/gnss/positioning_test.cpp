@@ -64,6 +64,19 @@ void expect_truth(const RawRun& run, const Receiver& receiver, double position, 
   }
 }
 
+/// Nearly normal numbers of variance 1.
+struct Normal {
+  std::uint64_t state = 1;
+  double operator()() {
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) {
+      state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+      sum += static_cast<double>(state >> 11U) * 0x1p-53;
+    }
+    return sum;
+  }
+};
+
 TEST(Positioning, FindsWhatTheReceiverDid) {
   const Flight flight;
   const RawRun run = run_raw(flight.log, {});
@@ -93,15 +106,7 @@ TEST(Positioning, WorksAnywhereOnTheEarth) {
 
 TEST(Positioning, ErrorsAreAsLargeAsTheCovarianceSays) {
   Flight flight;
-  std::uint64_t state = 1;
-  const auto noise = [&] {  // nearly normal
-    double sum = -6;
-    for (int i = 0; i < 12; ++i) {
-      state = state * 6364136223846793005ULL + 1442695040888963407ULL;
-      sum += static_cast<double>(state >> 11U) * 0x1p-53;
-    }
-    return sum;
-  };
+  Normal noise;
   PositioningOptions options;
   RawLog clean = flight.log;
   clean.epochs.resize(1);
@@ -235,6 +240,182 @@ TEST(Positioning, KnownRangesNeedNoEphemerides) {
   ASSERT_TRUE(run.epochs.front().position);
   EXPECT_LT((run.epochs.front().position->position - stuttgart()).norm(), 1e-3);
   EXPECT_FALSE(run.epochs.front().velocity);
+}
+
+/// An epoch at rest under an air of the test's own: exponential troposphere, ionosphere of a thin shell.
+Epoch under_own_air(const BroadcastData& data, const Vector3d& place, double seconds, double ionosphere) {
+  const Receiver receiver{[&](double) { return place; }};
+  const Geodetic where = geodetic_of(place);
+  BroadcastData bare = data;
+  bare.ionosphere.reset();
+  Epoch epoch = observe(bare, receiver, seconds);
+  for (Signal& s : epoch.signals) {
+    for (const KeplerEphemeris& e : data.kepler) {
+      if (e.satellite != s.satellite) continue;
+      const Direction seen =
+          direction_of(arrival(e, receiver.path, seconds).sent.position - place, enu_axes(where));
+      const double air = 2.4 * std::exp(-where.height / 7800) / std::sin(std::max(seen.elevation, 0.05));
+      const double flat = 0.9497 * std::cos(seen.elevation);  // sine of the zenith angle 350 km up
+      *s.pseudorange += air - troposphere_delay(where, seen) + ionosphere / std::sqrt(1 - flat * flat);
+    }
+  }
+  return epoch;
+}
+
+TEST(Positioning, WorksBelowTheSeaAndInTheAir) {
+  for (const double height : {-430.0, -107.0, -101.0, -100.0, -99.0, 3000.0, 9999.0, 11000.0, 20000.0}) {
+    const Vector3d place = ecef_of({0.096, 1.396, height});
+    RawLog log;
+    log.broadcast = sky();
+    log.broadcast.ionosphere = IonosphereModel{};  // its 5 ns of the night are 1.5 m
+    for (int i = 0; i < 20; ++i) log.epochs.push_back(under_own_air(log.broadcast, place, 30 * i, 1.5));
+    const RawRun run = run_raw(log, {});
+    EXPECT_EQ(run.without_position, 0U) << height;
+    for (const EpochResult& e : run.epochs) {
+      if (!e.position) continue;
+      EXPECT_LT((e.position->position - place).norm(), 2.5) << height;
+    }
+  }
+}
+
+TEST(Positioning, AnUnknownIonosphereIsSaidInTheSigma) {
+  const Vector3d place = stuttgart();
+  const Vector3d up = enu_axes(geodetic_of(place)).row(2);
+  for (const double zenith : {1.5, 5.0, 8.0, 10.0}) {
+    RawLog log;
+    log.broadcast = sky();
+    log.broadcast.ionosphere.reset();
+    log.epochs.push_back(under_own_air(log.broadcast, place, 0, zenith));
+    const RawRun run = run_raw(log, {});
+    ASSERT_TRUE(run.epochs.front().position);
+    const PositionFix& fix = *run.epochs.front().position;
+    const double sigma = std::sqrt(up.dot(fix.covariance * up));
+    const double error = up.dot(fix.position - place);
+    EXPECT_LT(std::abs(error), 2.5 * sigma) << zenith;
+    EXPECT_LT(std::abs(error), 2 * std::abs(zenith - 5) + 2) << zenith;
+    log.broadcast.ionosphere = sky().ionosphere;
+    const RawRun known = run_raw(log, {});
+    const Eigen::Matrix3d& covariance = known.epochs.front().position->covariance;
+    EXPECT_GT(sigma, std::sqrt(up.dot(covariance * up))) << zenith;
+  }
+}
+
+/// A receiver whose Doppler and phases are as noisy as said, and what is claimed of velocity and step.
+TEST(Positioning, TheNoiseOfAReceiverIsFoundFromItsResiduals) {
+  for (const double times : {0.5, 1.0, 3.0, 10.0}) {
+    const Vector3d place = stuttgart();
+    const Receiver receiver{[&](double) { return place; }};
+    RawLog log;
+    log.broadcast = sky();
+    Normal noise;
+    const PositioningOptions options;
+    for (int i = 0; i < 80; ++i) {
+      log.epochs.push_back(observe(log.broadcast, receiver, 0.2 * i));
+      for (Signal& s : log.epochs.back().signals) {
+        const double wavelength = kSpeedOfLight / carrier_frequency(s.satellite.system, s.code[0], 0);
+        // Rather even over the sky, so that the factor of the elevation is but part of the truth.
+        *s.doppler += times * options.doppler_sigma * noise() / wavelength;
+        *s.carrier += times * options.phase_sigma * noise() / wavelength;
+      }
+    }
+    const RawRun run = run_raw(log, options);
+    double velocity = 0, step = 0, claimed_velocity = 0, claimed_step = 0;
+    int velocities = 0, steps = 0;
+    for (std::size_t i = 40; i < run.epochs.size(); ++i) {
+      if (const auto& v = run.epochs[i].velocity) {
+        velocity += v->velocity.squaredNorm(), claimed_velocity += v->covariance.trace(), ++velocities;
+      }
+      if (const auto& s = run.epochs[i].step) {
+        step += s->step.squaredNorm(), claimed_step += s->covariance.trace(), ++steps;
+      }
+    }
+    EXPECT_EQ(velocities, 40) << times;
+    EXPECT_GE(steps, 38) << times;
+    // Of a receiver that is better than assumed nothing is made less.
+    const double least = times < 1 ? 0.2 : 0.7;
+    EXPECT_GT(std::sqrt(velocity / claimed_velocity), times < 1 ? 0.3 : 0.7) << times;
+    EXPECT_LT(std::sqrt(velocity / claimed_velocity), 1.4) << times;
+    EXPECT_GT(std::sqrt(step / claimed_step), least) << times;
+    EXPECT_LT(std::sqrt(step / claimed_step), 1.4) << times;
+    EXPECT_EQ(remarks_on(run.noise, options).size(), times > 2 ? 2U : 0U) << times;
+    // Who knows the receiver is believed.
+    PositioningOptions known = options;
+    known.estimate_doppler_sigma = known.estimate_phase_sigma = false;
+    EXPECT_TRUE(remarks_on(run.noise, known).empty());
+  }
+}
+
+/// Every satellite's range may be wrong by any amount, in the first epoch too, where nothing is known yet.
+TEST(Positioning, OneAbsurdRangeTakesNoPosition) {
+  const Flight flight;
+  for (const double wrong : {1e5, 1e7, 2.9e7, 3.1e7, 5e7, 1e8, 1e9, 9e9, -1e7, -1e8}) {
+    for (const std::size_t which : {0U, 5U, 11U}) {
+      RawLog log = flight.log;
+      log.epochs.resize(1);
+      *log.epochs[0].signals.at(which).pseudorange += wrong;
+      const RawRun run = run_raw(log, {});
+      ASSERT_TRUE(run.epochs[0].position) << wrong << " " << which;
+      EXPECT_LT((run.epochs[0].position->position - stuttgart()).norm(), 3) << wrong << " " << which;
+    }
+  }
+}
+
+/// Of two orbits that a satellite sends one after the other none is exact: their difference is no motion.
+TEST(Positioning, AChangeOfTheOrbitsIsNoStep) {
+  Flight flight;
+  std::erase_if(flight.data.kepler, [](const auto& e) { return e.satellite.system != System::gps; });
+  flight.log.epochs.clear();
+  for (int i = 0; i < 8; ++i) flight.log.epochs.push_back(observe(flight.data, flight.receiver, i));
+  flight.log.broadcast = flight.data;
+  double sign = 0.3;
+  for (const KeplerEphemeris& e : flight.data.kepler) {
+    KeplerEphemeris next = e;
+    next.toe.nanoseconds += 8 * kSecondInNanoseconds;  // the nearer one from 4 s on
+    next.toe_of_week += 8;
+    const double mean_motion = std::sqrt(3.986005e14 / std::pow(e.sqrt_a, 6)) + e.delta_n;
+    next.m0 += 8 * mean_motion, next.omega0 += 8 * e.omega_dot, next.i0 += 8 * e.idot;
+    next.af0 += sign * (1 + 0.1 * e.satellite.number) / kSpeedOfLight;
+    sign = -sign;
+    flight.log.broadcast.kepler.push_back(next);
+  }
+  const RawRun run = run_raw(flight.log, {});
+  int steps = 0;
+  for (std::size_t i = 1; i < 8; ++i) {
+    const auto& step = run.epochs[i].step;
+    if (!step) continue;
+    ++steps;
+    const double t = static_cast<double>(i);
+    EXPECT_LT((step->step - (flight.receiver.path(t) - flight.receiver.path(t - 1))).norm(), 2e-3) << i;
+    EXPECT_EQ(step->slips, 0) << i;
+  }
+  EXPECT_EQ(steps, 6);
+}
+
+TEST(Positioning, PhasesThatAllSlippedMakeNoStep) {
+  Flight flight;
+  int i = 0;
+  for (Signal& s : flight.log.epochs[4].signals) *s.carrier += 1 + 7 * i++ % 5;
+  for (std::size_t k = 5; k < 8; ++k) {
+    i = 0;
+    for (Signal& s : flight.log.epochs[k].signals) *s.carrier += 1 + 7 * i++ % 5;
+  }
+  const RawRun run = run_raw(flight.log, {});
+  EXPECT_FALSE(run.epochs[4].step);
+  EXPECT_TRUE(run.epochs[3].step);
+  EXPECT_TRUE(run.epochs[5].step);
+}
+
+TEST(Positioning, SatellitesWithoutASignalThatIsUsedAreNamed) {
+  Flight flight;
+  const SatelliteId id = flight.high();
+  for (Epoch& epoch : flight.log.epochs) {
+    for (Signal& s : epoch.signals) {
+      if (s.satellite == id) s.code = {'5', 'Q'};
+    }
+  }
+  const auto said = unusable_satellites(run_raw(flight.log, {}));
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0], "no pseudorange in the first band: " + to_string(id) + " (8 epochs)");
 }
 
 TEST(RangeGeometry, DerivativesAreThoseOfTheRange) {

@@ -34,6 +34,7 @@ class RawFilter : public testing::Test {
     options.pseudorange_sigma = 0.5;
     options.doppler_sigma = 0.04;
     options.phase_sigma = 0.0016;
+    options.estimate_doppler_sigma = options.estimate_phase_sigma = false;
     return options;
   }
   static gnss::Geodetic place() { return gnss::geodetic_of(gnss::stuttgart()); }
@@ -53,10 +54,12 @@ class RawFilter : public testing::Test {
   }
 
   struct Outcome {
-    double velocity_rms = 0;  ///< from 15 s on, m/s
-    double position_rms = 0;  ///< m
-    double motion_rms = 0;    ///< over 0.1 s, m
-    double nees = 0;          ///< of that motion, 3 expected
+    double velocity_rms = 0;    ///< from 15 s on, m/s
+    double position_rms = 0;    ///< m
+    double motion_rms = 0;      ///< over 0.1 s, m
+    double nees = 0;            ///< of that motion, 3 expected
+    double said_valid = 0;      ///< share of these motions
+    double wrong_of_valid = 0;  ///< of those, the share that is wrong by more than a fifth of the length
     RawTally tally;
     Health health;
   };
@@ -85,6 +88,8 @@ class RawFilter : public testing::Test {
       outcome.position_rms += (pose.T_world_body.translation - truth->T_world_body.translation).squaredNorm();
       outcome.motion_rms += error->translation * error->translation;
       outcome.nees += error->nees;
+      outcome.said_valid += motion.scale_valid;
+      outcome.wrong_of_valid += motion.scale_valid && error->translation > 0.2 * error->baseline;
       count += 1;
     });
     EXPECT_GT(count, 200);
@@ -92,6 +97,8 @@ class RawFilter : public testing::Test {
     outcome.position_rms = std::sqrt(outcome.position_rms / count);
     outcome.motion_rms = std::sqrt(outcome.motion_rms / count);
     outcome.nees /= count;
+    outcome.wrong_of_valid /= std::max(outcome.said_valid, 1.0);
+    outcome.said_valid /= count;
     outcome.tally = navigator.raw_tally();
     outcome.health = navigator.health();
     return outcome;
@@ -293,6 +300,83 @@ TEST_F(RawFilter, RepeatedEpochsDoNoHarm) {
   EXPECT_LT(outcome.velocity_rms, 0.1);
   EXPECT_LT(outcome.position_rms, 2);
   EXPECT_LT(outcome.nees, 5);
+}
+
+/// From 20 s on the gyroscope's x axis is wrong by 0.05 rad/s.
+void turn_gyroscope(NavigationLog& log) {
+  for (ImuSample& sample : log.imu) {
+    if (sample.time >= Time::from_seconds(20)) sample.angular_rate.x() += 0.05;
+  }
+}
+
+TEST_F(RawFilter, WithoutDopplerPhasesWatchTheFilter) {
+  auto epochs = measured({});
+  for (gnss::Epoch& epoch : epochs) {
+    for (gnss::Signal& s : epoch.signals) s.doppler.reset();
+  }
+  const auto good = fly(prepared(epochs));
+  EXPECT_EQ(good.tally.rates.used, 0U);
+  EXPECT_EQ(good.health.status, NavigationStatus::navigating);
+  EXPECT_EQ(good.health.times_lost, 0U);
+  EXPECT_LT(good.velocity_rms, 0.1);
+  turn_gyroscope(log_);
+  const auto bad = fly(prepared(epochs));
+  EXPECT_GT(bad.health.times_lost, 0U);
+  EXPECT_NE(bad.health.status, NavigationStatus::lost);
+  EXPECT_LT(bad.wrong_of_valid, 0.05);
+  EXPECT_GT(bad.said_valid, 0.3);
+  EXPECT_LT(bad.velocity_rms, 1);
+}
+
+TEST_F(RawFilter, AReceiverNoisierThanAssumedIsNoFault) {
+  // As a receiver of 5 cm/s and 2 mm, and one of three times that, by weights of another of 1.6 cm/s and 0.9
+  // mm.
+  for (const double times : {1.0, 3.0}) {
+    RawGnssModel model;
+    model.rate_white *= times, model.phase_white *= times;
+    RawObserver observer(data_, {}, LocalFrame::at(place()), gnss::noon());
+    RawEpochs epochs;
+    for (const auto& e : measured(model)) epochs.push_back(observer.observe(e));
+    const auto outcome = fly(epochs);
+    EXPECT_EQ(outcome.health.times_lost, 0U) << times;
+    EXPECT_LT(outcome.velocity_rms, 0.05 * times) << times;
+    EXPECT_LT(outcome.nees, 6) << times;
+    EXPECT_LT(outcome.wrong_of_valid, 0.01) << times;
+    const auto& rates = outcome.tally.rates;
+    EXPECT_LT(static_cast<double>(rates.refused), 0.02 * static_cast<double>(rates.used)) << times;
+  }
+}
+
+/// GPS joins the others, whose signals are some hundred metres off its time.
+TEST_F(RawFilter, GpsThatComesLaterIsTakenIn) {
+  const auto shifted = [&](gnss::System system, double metres, Time absent_until) {
+    auto epochs = measured({});
+    for (gnss::Epoch& epoch : epochs) {
+      const Time time{epoch.time.nanoseconds - gnss::noon().nanoseconds};
+      const auto is_of = [&](const gnss::Signal& s) { return s.satellite.system == system; };
+      if (time < absent_until) std::erase_if(epoch.signals, is_of);
+      for (gnss::Signal& s : epoch.signals) {
+        if (is_of(s)) *s.pseudorange += metres;
+      }
+    }
+    return fly(prepared(epochs));
+  };
+  const auto joined = shifted(gnss::System::gps, 150, Time::from_seconds(12));
+  EXPECT_LT(static_cast<double>(joined.tally.ranges.refused),
+            0.02 * static_cast<double>(joined.tally.ranges.used));
+  EXPECT_LT(joined.position_rms, 3);
+  EXPECT_LT(joined.velocity_rms, 0.1);
+}
+
+TEST_F(RawFilter, WhatWasUsedBeforeARestartIsCounted) {
+  const auto whole = fly(prepared(measured({})));
+  std::erase_if(log_.imu, [](const ImuSample& sample) {
+    return sample.time > Time::from_seconds(36) && sample.time < Time::from_seconds(39.5);
+  });
+  const auto cut = fly(prepared(measured({})));
+  EXPECT_EQ(cut.health.restarts, 1U);
+  EXPECT_EQ(cut.health.status, NavigationStatus::uninitialised);
+  EXPECT_GT(cut.tally.ranges.used, whole.tally.ranges.used / 2);
 }
 
 }  // namespace

@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
+#include <gtest/gtest.h>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/sequence/trajectory.hpp"
 #include "pade/simulation/analytic/analytic_flights.hpp"
 #include "pade/simulation/analytic/analytic_render.hpp"
@@ -25,11 +26,12 @@ inline void write_flight(const std::filesystem::path& folder, const std::string&
   for (std::size_t k = 0; k < flight.times.size(); ++k) {
     const std::string file = to_string(flight.times[k]) + ".png";
     const Pose& pose = flight.T_world_camera[k];
-    cv::imwrite(folder / "rgb" / file, simulation::render_image(flight.scene, flight.camera, pose));
+    EXPECT_TRUE(
+        io::save_image(folder / "rgb" / file, simulation::render_image(flight.scene, flight.camera, pose)));
     cv::Mat depth = simulation::exact_depth(flight.scene, flight.camera, pose);
     cv::patchNaNs(depth);
     depth.convertTo(depth, CV_16U, 1000);
-    cv::imwrite(folder / "depth" / file, depth);
+    EXPECT_TRUE(io::save_image(folder / "depth" / file, depth));
     poses.push_back({flight.times[k], pose});
   }
   std::ofstream(folder / "groundtruth.txt") << io::format_trajectory(poses);

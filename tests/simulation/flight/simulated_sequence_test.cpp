@@ -9,10 +9,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <unistd.h>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/sequence/sequence.hpp"
 #include "pade/simulation/generator/paper_set.hpp"
 #include "pade/simulation/render/truth.hpp"

@@ -125,6 +125,32 @@ TEST(Trajectory, HeadingFollowsThePath) {
   }
 }
 
+/// A gyroscope that shows nothing while the attitude leaps is no gyroscope.
+TEST(Trajectory, AHeadingThatLeapsIsRefused) {
+  TrajectoryOptions options;
+  options.heading = Heading::path;
+  options.speed = 0.7;
+  const std::vector<Waypoint> there_and_back = {{{0, 0, 2}, 0, {}}, {{0, 4, 2}, 0, {}}, {{0, 0, 2}, 0, {}}};
+  for (const PathEnd end : {PathEnd::moving, PathEnd::rest}) {
+    options.start = options.end = end;
+    const auto path = Trajectory::through(there_and_back, options);
+    ASSERT_FALSE(path.ok());
+    EXPECT_THAT(path.error().message, testing::HasSubstr("angular rate between waypoints"));
+  }
+}
+
+TEST(Trajectory, AtRestItLooksWhereItLeavesAndArrives) {
+  TrajectoryOptions options;
+  options.heading = Heading::path;
+  options.start = options.end = PathEnd::rest;
+  const Trajectory path = flown({{{0, 0, 2}, 0, {}}, {{0, 6, 2}, 0, {}}, {{-3, 12, 2}, 0, {}}}, options);
+  for (const double t : {0.0, path.duration()}) {
+    const KinematicState there = path.at(t);
+    const KinematicState near = path.at(t > 0 ? t - 0.2 : 0.2);
+    EXPECT_LT(there.R_world_body.angularDistance(near.R_world_body), 0.2) << t;
+  }
+}
+
 TEST(Trajectory, RefusesWhatTheVehicleCannotFly) {
   const auto refused = [](const std::vector<Waypoint>& waypoints, const TrajectoryOptions& options) {
     const auto path = Trajectory::through(waypoints, options);

@@ -12,9 +12,9 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <unistd.h>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/simulation/render/scene.hpp"
 #include "pade/simulation/sdf/sdf_reader.hpp"
 #include "pade/simulation/world/mesh_file.hpp"
@@ -384,7 +384,7 @@ class GazeboWorlds : public testing::TestWithParam<Case> {
     const std::filesystem::path file = root_ / "worlds" / name;
     std::filesystem::create_directories(file.parent_path());
     if (name.ends_with(".png")) {
-      cv::imwrite(file.string(), cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(255)));
+      EXPECT_TRUE(io::save_image(file.string(), cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(255))));
     } else {
       std::ofstream(file) << text;
     }

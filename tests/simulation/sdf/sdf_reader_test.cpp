@@ -6,7 +6,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
+
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::simulation {
 namespace {
@@ -103,7 +104,8 @@ TEST_F(SdfReader, FindsIncludedModelsMeshesAndImages) {
         "material>"
         "</visual></link></model></sdf>");
   write("models/tower/meshes/t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
-  cv::imwrite((folder_ / "models/tower/t.png").string(), cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 20, 30)));
+  EXPECT_TRUE(io::save_image((folder_ / "models/tower/t.png").string(),
+                             cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 20, 30))));
   const auto result = read_sdf(world("<include><uri>model://tower</uri><pose>5 0 0 0 0 0</pose></include>"));
   ASSERT_TRUE(result.ok()) << message(result);
   ASSERT_EQ(result->visuals.size(), 1U);

@@ -106,9 +106,34 @@ PADE_INLINE void gather_pairs(const float* base, I index, V& first, V& second) {
   const V high = fetch(_mm256_extracti128_si256(__m256i(order), 1));
   first = V(_mm256_shuffle_ps(__m256(low), __m256(high), 0x88));
   second = V(_mm256_shuffle_ps(__m256(low), __m256(high), 0xdd));
+#elif defined(__aarch64__)
+  const auto fetch = [&](int lane) { return vld1_f32(base + index[lane]); };
+  const float32x4_t low = vcombine_f32(fetch(0), fetch(1));
+  const float32x4_t high = vcombine_f32(fetch(2), fetch(3));
+  first = V(vuzp1q_f32(low, high));
+  second = V(vuzp2q_f32(low, high));
 #else
   first = gather(base, index);
   second = gather(base + 1, index);
+#endif
+}
+
+// Whether pick() is one instruction.
+#if defined(__AVX2__)
+inline constexpr bool kPicks = true;
+#else
+inline constexpr bool kPicks = false;
+#endif
+// Lane i of the result is lane `lane[i]` of `values`; of `lane` only the bits that number lanes count.
+PADE_INLINE V pick(V values, I lane) {
+#if defined(__AVX512F__)
+  return V(_mm512_maskz_permutexvar_ps(kAll, __m512i(lane), __m512(values)));
+#elif defined(__AVX2__)
+  return V(_mm256_permutevar8x32_ps(__m256(values), __m256i(lane)));
+#else
+  V out;
+  for (int i = 0; i < kLanes; ++i) out[i] = values[lane[i] & (kLanes - 1)];
+  return out;
 #endif
 }
 
@@ -126,6 +151,8 @@ PADE_INLINE bool all(I mask) {
   return _mm256_movemask_epi8(__m256i(mask)) == -1;
 #elif defined(__SSE2__)
   return _mm_movemask_epi8(__m128i(mask)) == 0xffff;
+#elif defined(__aarch64__)
+  return vminvq_u32(uint32x4_t(mask)) != 0;
 #else
   return (mask[0] & mask[1] & mask[2] & mask[3]) != 0;
 #endif
@@ -139,6 +166,9 @@ PADE_INLINE unsigned bits(I mask) {
   return static_cast<unsigned>(_mm256_movemask_ps(__m256(mask)));
 #elif defined(__SSE2__)
   return static_cast<unsigned>(_mm_movemask_ps(__m128(mask)));
+#elif defined(__aarch64__)
+  constexpr uint32x4_t kLane = {1, 2, 4, 8};
+  return vaddvq_u32(vandq_u32(uint32x4_t(mask), kLane));
 #else
   return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2) | (mask[2] & 4) | (mask[3] & 8));
 #endif

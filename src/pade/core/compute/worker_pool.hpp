@@ -57,6 +57,8 @@ class WorkerPool {
       if (now != old) return now;
 #if defined(__x86_64__)
       __builtin_ia32_pause();
+#elif defined(__aarch64__)
+      __asm__ volatile("isb");  // waits some cycles; `yield` does nothing on most of its processors
 #endif
     }
     value.wait(old, std::memory_order_acquire);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "pade/core/option_check.hpp"
 
@@ -20,10 +22,15 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 class Columns {
  public:
   Columns(const DepthImage& image, const Camera& camera, const Eigen::Vector3d& up)
-      : image_(image),
-        camera_(camera),
-        ahead_((Eigen::Vector3d::UnitZ() - up.z() * up).normalized()),
-        lean_(-up.x() / up.y()) {}
+      : image_(image), camera_(camera), ahead_((Eigen::Vector3d::UnitZ() - up.z() * up).normalized()) {
+    const double lean = -up.x() / up.y();  // to the right per row upward
+    for (int v = 0; v <= image.bound.rows; ++v) {
+      shifts_.push_back(static_cast<int>(std::lround(lean * (image.bound.rows - 1 - v))));
+    }
+    for (int u = 0; u < image.bound.cols; ++u) {
+      ray_x_.push_back((cell_centre(u, image.window) - camera.cx) / camera.fx);
+    }
+  }
 
   /// Of the pixel below (u, v) in its column; outside of the image where there is none.
   [[nodiscard]] cv::Point below(int u, int v) const { return {u - shift(v) + shift(v + 1), v + 1}; }
@@ -35,8 +42,8 @@ class Columns {
   }
   /// The ray of a pixel, z = 1.
   [[nodiscard]] Eigen::Vector3d ray(int u, int v) const {
-    return {(cell_centre(u, image_.window) - camera_.cx) / camera_.fx,
-            (cell_centre(v, image_.window) - camera_.cy) / camera_.fy, 1};
+    return {ray_x_[static_cast<std::size_t>(u)], (cell_centre(v, image_.window) - camera_.cy) / camera_.fy,
+            1};
   }
   /// Metres ahead, level, per metre of depth: what is vertical is as far ahead all the way up. Not above
   /// zero: behind the camera.
@@ -47,14 +54,13 @@ class Columns {
 
  private:
   /// Whole pixels, the same for all of a row: no column is lost.
-  [[nodiscard]] int shift(int v) const {
-    return static_cast<int>(std::lround(lean_ * (image_.bound.rows - 1 - v)));
-  }
+  [[nodiscard]] int shift(int v) const { return shifts_[static_cast<std::size_t>(v)]; }
 
   const DepthImage& image_;
   const Camera& camera_;
-  Eigen::Vector3d ahead_;  // level
-  double lean_;            // to the right per row upward
+  Eigen::Vector3d ahead_;      // level
+  std::vector<int> shifts_;    // to the right, by rows and one more
+  std::vector<double> ray_x_;  // by columns
 };
 
 float Columns::footing(cv::Point p) const {
@@ -112,24 +118,28 @@ void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vect
   if (!options.on || image.bound.empty() || -up.y() < kSteepest || std::abs(up.x()) > -up.y()) return;
   const Columns columns(image, camera, up);
   const int width = image.bound.cols;
-  cv::Mat footing(image.bound.size(), CV_32FC1, cv::Scalar(kNone));
+  std::vector<float> footing;  // of the row below
+  std::vector<float> found;
   for (int v = image.bound.rows - 1; v >= 0; --v) {
-    auto* found = footing.ptr<float>(v);
+    std::swap(footing, found);
+    found.assign(static_cast<std::size_t>(width), kNone);
     for (int u = 0; u < width; ++u) {
       const cv::Point below = columns.below(u, v);
       if (!columns.is_blank({u, v}) || !columns.holds(below)) continue;
-      found[u] = columns.is_blank(below) ? footing.at<float>(below) : columns.footing(below);
+      found[static_cast<std::size_t>(u)] =
+          columns.is_blank(below) ? footing[static_cast<std::size_t>(below.x)] : columns.footing(below);
     }
-    fill_gaps(found, image.state.ptr<std::uint8_t>(v), width);
+    fill_gaps(found.data(), image.state.ptr<std::uint8_t>(v), width);
     for (int u = 0; u < width; ++u) {
-      if (!(found[u] > 0)) continue;
+      const float at = found[static_cast<std::size_t>(u)];
+      if (!(at > 0)) continue;
       const Eigen::Vector3d ray = columns.ray(u, v);
       const float ahead = columns.ahead(ray);
       if (!(ahead > 0)) continue;
       const double climb = up.dot(ray);  // m of height per m of depth
       const double most = climb > 0 ? options.headroom / climb : std::numeric_limits<double>::infinity();
       auto& bound = image.bound.at<float>(v, u);
-      const float free = std::min(found[u] / ahead, static_cast<float>(most));
+      const float free = std::min(at / ahead, static_cast<float>(most));
       if (!(bound >= free)) bound = free;
     }
   }

@@ -2,101 +2,130 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <vector>
+
+#include "pade/depth/image/outlines_kernel.hpp"
 
 namespace pade::depth {
 namespace {
 
-constexpr int kLines = 4;       // along the row, the column and the diagonals
-constexpr int kFewestRays = 5;  // of eight
 constexpr float kUnknown = std::numeric_limits<float>::infinity();
+constexpr float kOpen = -1;
+constexpr auto kBlank = static_cast<std::uint8_t>(DepthState::no_texture);
 
-/// What a ray meets first.
-struct Met {
-  float rho = -1;   ///< inverse of the bound there; infinity = unknown; negative = the border of the image
-  float steps = 0;  ///< to there
-  [[nodiscard]] bool border() const { return rho < 0; }
-  [[nodiscard]] bool known() const { return rho >= 0 && rho < kUnknown; }
+/// Memory of a row; pixels -1 and `width` are the border of the image.
+class OutlineMemory {
+ public:
+  explicit OutlineMemory(int width)
+      : length_(static_cast<std::size_t>(width) + 2 + kOutlineSlack),
+        rho_(kOutlineRays * length_, -1.0F),
+        steps_(kOutlineRays * length_, 0.0F) {}
+  [[nodiscard]] OutlineRow row() {
+    OutlineRow out{};
+    for (std::size_t i = 0; i < kOutlineRays; ++i) {
+      out.rho[i] = rho_.data() + i * length_ + 1;
+      out.steps[i] = steps_.data() + i * length_ + 1;
+    }
+    return out;
+  }
+
+ private:
+  std::size_t length_;
+  std::vector<float> rho_, steps_;
 };
-using Rays = std::array<Met, kLines>;
 
-/// For the open pixels of a row, what half of their rays meet: back along the row, and to the row before it.
-/// `before` and `here` have a pixel more at both ends.
-void look_back(const float* bound, const std::uint8_t* open, int width, int step,
-               const std::vector<Rays>& before, std::vector<Rays>& here) {
-  Met along;
-  const auto next = [](Met met) {
-    met.steps += 1;
-    return met;
-  };
-  for (int j = 0; j < width; ++j) {
-    const int u = step > 0 ? j : width - 1 - j;
-    const auto at = static_cast<std::size_t>(u) + 1;
-    const std::size_t toward = step > 0 ? at - 1 : at + 1;
-    const std::size_t away = step > 0 ? at + 1 : at - 1;
-    Rays& rays = here[at];
-    if (open[u] == 0) {
-      rays.fill({bound[u] > 0 ? 1 / bound[u] : kUnknown, 0});
-    } else {
-      rays = {next(along), next(before[at][1]), next(before[toward][2]), next(before[away][3])};
-    }
-    along = rays[0];
-  }
-}
-
-/// Inverse of the bound that a line gives to a pixel between its ends.
-float between(const Met& a, const Met& b) {
-  if (!a.known() || !b.known()) return kUnknown;
-  return (a.rho * b.steps + b.rho * a.steps) / (a.steps + b.steps);
-}
-
-/// Inverse of a pixel's bound; infinity = none.
-float inverse_bound(const Rays& a, const Rays& b) {
-  std::array<float, kLines> lines{};
-  float greatest = 0;
-  int rays = 0;
-  for (std::size_t i = 0; i < kLines; ++i) {
-    lines[i] = between(a[i], b[i]);
-    for (const Met& met : {a[i], b[i]}) {
-      if (met.border()) continue;
-      ++rays;
-      greatest = std::max(greatest, met.rho);
+/// What the rays of open pixels meet above, of all rows one after the other: the image is walked through
+/// twice, from above and from below, and little of it is open.
+class Above {
+ public:
+  explicit Above(int open)
+      : values_(std::make_unique_for_overwrite<float[]>(2 * kOutlineRays * static_cast<std::size_t>(open) +
+                                                        kOutlineSlack)),
+        end_(values_.get()) {}
+  /// Takes the pixels from `first` to before `last` of a row.
+  void push(const OutlineRow& row, int first, int last) {
+    for (const auto& lines : {row.rho, row.steps}) {
+      for (int i = 0; i < kOutlineRays; ++i) end_ = std::copy(lines[i] + first, lines[i] + last, end_);
     }
   }
-  std::sort(lines.begin(), lines.end());
-  if (lines[1] < kUnknown) return lines[1];
-  return rays >= kFewestRays ? greatest : kUnknown;
+  /// The last ones that were taken, as many as then.
+  [[nodiscard]] OutlineRow pop(int count) {
+    end_ -= 2L * kOutlineRays * count;
+    OutlineRow out{};
+    for (int i = 0; i < kOutlineRays; ++i) {
+      out.rho[i] = end_ + static_cast<std::ptrdiff_t>(i) * count;
+      out.steps[i] = end_ + static_cast<std::ptrdiff_t>(kOutlineRays + i) * count;
+    }
+    return out;
+  }
+
+ private:
+  std::unique_ptr<float[]> values_;
+  float* end_;
+};
+
+/// Calls work(first, last) for the runs of open pixels, from the left or from the right.
+template <class Work>
+void over_runs(const float* own, int width, int step, const Work& work) {
+  const auto open = [&](int j) { return own[step > 0 ? j : width - 1 - j] < 0; };
+  for (int j = 0; j < width;) {
+    if (!open(j)) {
+      ++j;
+      continue;
+    }
+    const int begin = j;
+    while (j < width && open(j)) ++j;
+    step > 0 ? work(begin, j) : work(width - j, width - begin);
+  }
 }
 
 }  // namespace
 
 void bound_by_outlines(DepthImage& image) {
   if (image.bound.empty()) return;
-  const cv::Mat open = image.state == static_cast<std::uint8_t>(DepthState::no_texture);
-  const int width = open.cols;
-  const int height = open.rows;
-  const std::vector<Rays> outside(static_cast<std::size_t>(width) + 2);
-  std::vector<std::vector<Rays>> above(static_cast<std::size_t>(height), outside);
-  for (int v = 0; v < height; ++v) {
-    const auto row = static_cast<std::size_t>(v);
-    look_back(image.bound.ptr<float>(v), open.ptr<std::uint8_t>(v), width, 1,
-              v > 0 ? above[row - 1] : outside, above[row]);
-  }
-  std::vector<Rays> below = outside;
-  std::vector<Rays> here = outside;
-  for (int v = height - 1; v >= 0; --v) {
-    auto* bound = image.bound.ptr<float>(v);
-    const auto* is_open = open.ptr<std::uint8_t>(v);
-    look_back(bound, is_open, width, -1, below, here);
-    std::swap(below, here);
+  const int width = image.bound.cols;
+  const int height = image.bound.rows;
+  const auto isa = simd::best();
+  std::vector<float> own(static_cast<std::size_t>(width) + kOutlineSlack);
+  const auto look = [&](int v) {
+    const auto* bound = image.bound.ptr<float>(v);
+    const auto* state = image.state.ptr<std::uint8_t>(v);
     for (int u = 0; u < width; ++u) {
-      if (is_open[u] == 0) continue;
-      const auto at = static_cast<std::size_t>(u) + 1;
-      const float rho = inverse_bound(above[static_cast<std::size_t>(v)][at], below[at]);
-      if (rho < kUnknown && !(bound[u] * rho >= 1)) bound[u] = 1 / rho;
+      const float inverse = 1 / bound[u];  // in any case: so that the loop vectorises
+      const float rho = bound[u] > 0 ? inverse : kUnknown;
+      own[static_cast<std::size_t>(u)] = state[u] == kBlank ? kOpen : rho;
     }
+  };
+  const OutlineMemory outside(width);
+  std::array<OutlineMemory, 2> rows = {outside, outside};
+  Above above(cv::countNonZero(image.state == kBlank));
+  for (int v = 0; v < height; ++v) {
+    look(v);
+    const OutlineRow here = rows[v % 2].row();
+    PADE_DISPATCH(outline_row, isa)(own.data(), width, 1, rows[(v + 1) % 2].row(), here);
+    over_runs(own.data(), width, 1, [&](int first, int last) { above.push(here, first, last); });
+  }
+  rows = {outside, outside};
+  std::vector<float> found(own.size());
+  for (int v = height - 1; v >= 0; --v) {
+    look(v);
+    const OutlineRow here = rows[v % 2].row();
+    PADE_DISPATCH(outline_row, isa)(own.data(), width, -1, rows[(v + 1) % 2].row(), here);
+    over_runs(own.data(), width, -1, [&](int first, int last) {
+      OutlineRow below = here;
+      for (float*& line : below.rho) line += first;
+      for (float*& line : below.steps) line += first;
+      PADE_DISPATCH(outline_bounds, isa)(above.pop(last - first), below, last - first, found.data());
+      auto* bound = image.bound.ptr<float>(v) + first;
+      for (int u = 0; u < last - first; ++u) {
+        const float rho = found[static_cast<std::size_t>(u)];
+        if (rho < kUnknown && !(bound[u] * rho >= 1)) bound[u] = 1 / rho;
+      }
+    });
   }
 }
 

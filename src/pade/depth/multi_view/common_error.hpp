@@ -29,14 +29,22 @@ class CommonError {
   /// cell, 4 x 4.
   [[nodiscard]] float operator()(int u, int v, float rho) const {
     if (cells_.empty()) return 0;
-    const Cell* cell = &cells_[static_cast<std::size_t>(v / kCell * columns_ + u / kCell) * views_];
-    const Cell* const shortest = cell + views_ - 1;
-    while (cell != shortest && cell->parallax2 * rho * rho > largest_parallax2_) ++cell;
-    return rho * (rho * cell->of_translation + cell->of_both) + cell->of_rotation;
+    const Cell* at = &cells_[static_cast<std::size_t>(v / cell * columns_ + u / cell) * views_];
+    const Cell* const shortest = at + views_ - 1;
+    while (at != shortest && at->parallax2 * rho * rho > largest_parallax2_) ++at;
+    return rho * (rho * at->of_translation + at->of_both) + at->of_rotation;
   }
+  static constexpr int cell = 4;  ///< px
+  /// Views that are asked; 0 = all are exact.
+  [[nodiscard]] int views() const { return static_cast<int>(views_); }
+  /// px^2: over which a view is not used for a point.
+  [[nodiscard]] float largest_parallax2() const { return largest_parallax2_; }
+  /// What a row of cells holds, for each of its pixels: for each view, the longest baseline first, |a|^2 and
+  /// the three coefficients of the variance, each `width` numbers.
+  /// @param row  of the cells. @param width  of the image, px
+  void expand(int row, int width, std::vector<float>& out) const;
 
  private:
-  static constexpr int kCell = 4;  // px
   /// Of one view: the variance is a quadratic in rho.
   struct Cell {
     float parallax2;  // |a|^2

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <vector>
 
 #include <opencv2/imgproc.hpp>
 
 #include "pade/core/compute/simd.hpp"
 #include "pade/core/option_check.hpp"
+#include "pade/depth/multi_view/read_kernel.hpp"
 #include "pade/depth/multi_view/start_kernel.hpp"
 
 namespace pade::depth {
@@ -17,12 +18,6 @@ constexpr float kEpipoleRadius = 5;     // px: nearer to the epipole the paralla
 constexpr float kUntold = 1.5F;         // px: less parallax of a pair does not gainsay what was found
 constexpr float kNearestDepth = 0.05F;  // m
 constexpr int kBoundRadius = 2;         // px
-constexpr float kTexture = 1.6F;        // least squared slopes, in those of noise
-constexpr float kClearTexture = 2.4F;   // ... of a pixel that has a bound, but no depth
-constexpr float kVague = 0.5F;  // px: sigma of the parallax from which on the image says nothing of it
-
-constexpr auto code(DepthState state) { return static_cast<std::uint8_t>(state); }
-
 }  // namespace
 
 Status check(const ViewsDepthOptions& o) {
@@ -74,81 +69,6 @@ cv::Mat start_of_views(const DepthImage& two_view, const cv::Mat& flow, const Ca
 
 namespace {
 
-/// Rows of the planes of a depth image.
-struct Row {
-  Row(DepthImage& image, int v)
-      : depth(image.depth.ptr<float>(v)),
-        variance(image.variance.ptr<float>(v)),
-        own_variance(image.own_variance.ptr<float>(v)),
-        bound(image.bound.ptr<float>(v)),
-        state(image.state.ptr<std::uint8_t>(v)) {}
-  float* depth;
-  float* variance;
-  float* own_variance;
-  float* bound;
-  std::uint8_t* state;
-};
-
-/// What is decided per pixel.
-class Reader {
- public:
-  Reader(double scale, const DepthOptions& depth, const ViewsDepthOptions& options)
-      : scale_(static_cast<float>(scale)),
-        range_(static_cast<float>(depth.range)),
-        k_(static_cast<float>(depth.bound_sigmas)),
-        gate2_(static_cast<float>(depth.parallax_gate * depth.parallax_gate)),
-        sigma_scale2_(static_cast<float>(options.sigma_scale * options.sigma_scale)),
-        relative2_(static_cast<float>(options.relative_sigma * options.relative_sigma)) {}
-
-  /// sigma^2 of d: the views' own, more where they contradict each other, and a share of d.
-  [[nodiscard]] float variance(float d, float information, float matching, float spread) const {
-    const float contradiction = matching > 1 ? std::max(1.0F, spread / (matching - 1)) : 1.0F;
-    return sigma_scale2_ * contradiction / information + relative2_ * d * d;
-  }
-  /// Z before which there is nothing.
-  [[nodiscard]] float bound(float d, float sigma2) const {
-    return scale_ / (std::max(d, 0.0F) + k_ * std::sqrt(sigma2));
-  }
-  /// A pixel whose depth was no good.
-  static void drop(const Row& row, int u, DepthState why) {
-    row.depth[u] = row.variance[u] = row.own_variance[u] = std::numeric_limits<float>::quiet_NaN();
-    row.state[u] = code(why);
-  }
-  /// Whether a depth with this variance is one to publish.
-  [[nodiscard]] bool is_measured(float d, float sigma2) const {
-    return d > 0 && sigma2 * gate2_ < d * d && scale_ <= range_ * d;
-  }
-  /// Depth, variance and state in place of what pixel u has.
-  /// @param common  variance of d that all pixels share
-  void place(const Row& row, int u, float d, float sigma2, float common) const {
-    const float z = scale_ / d;
-    const float e2 = sigma2 / (d * d);
-    row.depth[u] = z;
-    row.own_variance[u] = z * z * e2 * (1 + e2 * (18 + 400 * e2));
-    row.variance[u] = row.own_variance[u] + z * z * common / (d * d);
-    row.state[u] = code(DepthState::measured);
-  }
-  /// What a pixel is that the views have seen without measuring it.
-  void refuse(const Row& row, int u, float sigma2) const {
-    if (row.state[u] == code(DepthState::epipole)) return;
-    const bool vague = sigma2 > kVague * kVague;
-    if (row.state[u] == code(DepthState::measured) || vague) {
-      drop(row, u, vague ? DepthState::no_texture : DepthState::low_parallax);
-    }
-    const bool low = row.state[u] == code(DepthState::low_parallax);
-    if (low && row.bound[u] >= range_) row.state[u] = code(DepthState::far);
-  }
-
- private:
-  float scale_, range_, k_, gate2_, sigma_scale2_, relative2_;
-};
-
-/// States of a pair in which several views are not asked.
-bool is_blind(std::uint8_t state) {
-  return state == code(DepthState::inconsistent) || state == code(DepthState::out_of_view) ||
-         state == code(DepthState::no_texture);
-}
-
 /// What a window has matched may be that of a pixel beside: no bound is beyond those around it.
 void shorten_bounds(const cv::Mat& of_views, cv::Mat& bound) {
   constexpr int kSide = 2 * kBoundRadius + 1;
@@ -161,42 +81,32 @@ void shorten_bounds(const cv::Mat& of_views, cv::Mat& bound) {
 
 void read_views(const ParallaxField& field, double scale, const CommonError& common,
                 const DepthOptions& depth, const ViewsDepthOptions& options, DepthImage& image) {
-  const Reader reader(scale, depth, options);
-  const auto per_scale = static_cast<float>(1 / scale);
-  const auto scale2 = static_cast<float>(scale * scale);
-  cv::Mat bounds(image.depth.size(), CV_32FC1, cv::Scalar(std::numeric_limits<float>::infinity()));
+  ReadParameters p{};
+  p.scale = static_cast<float>(scale);
+  p.per_scale = static_cast<float>(1 / scale);
+  p.scale2 = static_cast<float>(scale * scale);
+  p.range = static_cast<float>(depth.range);
+  p.bound_sigmas = static_cast<float>(depth.bound_sigmas);
+  p.gate2 = static_cast<float>(depth.parallax_gate * depth.parallax_gate);
+  p.sigma_scale2 = static_cast<float>(options.sigma_scale * options.sigma_scale);
+  p.relative2 = static_cast<float>(options.relative_sigma * options.relative_sigma);
+  p.largest_parallax2 = common.largest_parallax2();
+  p.views = common.views();
+  const auto read = PADE_DISPATCH(read_row, simd::best());
+  std::vector<float> errors;
+  cv::Mat bounds(image.depth.size(), CV_32FC1);
   for (int v = 0; v < image.depth.rows; ++v) {
-    const Row row(image, v);
-    const auto* d = field.distance.ptr<float>(v);
-    const auto* information = field.information.ptr<float>(v);
-    const auto* spread = field.spread.ptr<float>(v);
-    const auto* matching = field.matching.ptr<float>(v);
-    const auto* offset = field.offset.ptr<float>(v);
-    const auto* texture = field.texture.ptr<float>(v);
-    auto* bound = bounds.ptr<float>(v);
-    for (int u = 0; u < image.depth.cols; ++u) {
-      if (is_blind(row.state[u])) continue;
-      if (!(information[u] > 0) || !(texture[u] > kTexture)) {
-        if (matching[u] > 0) Reader::drop(row, u, DepthState::no_texture);
-        continue;
-      }
-      const float sigma2 =
-          reader.variance(d[u], information[u], matching[u], spread[u]) + offset[u] * offset[u];
-      const bool measured = reader.is_measured(d[u], sigma2);
-      // A vague bound is worse than that of the outline around.
-      if (!measured && !(texture[u] > kClearTexture)) {
-        Reader::drop(row, u, DepthState::no_texture);
-        continue;
-      }
-      const float shared = scale2 * common(u, v, std::max(d[u], 0.0F) * per_scale);
-      bound[u] = reader.bound(d[u], sigma2 + shared);
-      if (!(row.bound[u] >= bound[u])) row.bound[u] = bound[u];
-      if (measured) {
-        reader.place(row, u, d[u], sigma2, shared);
-      } else {
-        reader.refuse(row, u, sigma2);
-      }
-    }
+    if (v % CommonError::cell == 0) common.expand(v / CommonError::cell, image.depth.cols, errors);
+    const ReadField row = {field.distance.ptr<float>(v),
+                           field.information.ptr<float>(v),
+                           field.spread.ptr<float>(v),
+                           field.offset.ptr<float>(v),
+                           field.matching.ptr<float>(v),
+                           field.texture.ptr<float>(v),
+                           errors.data()};
+    read(p, row, image.depth.cols,
+         {image.depth.ptr<float>(v), image.variance.ptr<float>(v), image.own_variance.ptr<float>(v),
+          image.bound.ptr<float>(v), bounds.ptr<float>(v), image.state.ptr<std::uint8_t>(v)});
   }
   shorten_bounds(bounds, image.bound);
 }

@@ -20,8 +20,8 @@ void clg_warp(const ClgLevel& level, int first, int last) {
       const V inside_x = clamp(at_x, 0, right);
       const V inside_y = clamp(at_y, 0, bottom);
       const V here = load(level.first.row(y) + x);
-      const V warped = bilinear(level.second.data, level.second.stride, inside_x, inside_y);
       const I seen = I(at_x == inside_x) & I(at_y == inside_y);
+      const V warped = bilinear(level.second.data, level.second.stride, inside_x, inside_y, seen);
       store(level.mean.row(y) + x, select(seen, 0.5F * (here + warped), here));
       store(level.difference.row(y) + x, select(seen, warped - here, V{}));
     }

@@ -109,7 +109,7 @@ class Warped {
       const V inside_y = clamp(at.y, 0, bottom);
       const I seen = at.used & I(inside_x == at.x) & I(inside_y == at.y);
       const V here = load(first_.row(y) + x);
-      const V there = bilinear(second_.data, second_.stride, inside_x, inside_y);
+      const V there = bilinear(second_.data, second_.stride, inside_x, inside_y, seen);
       store(slot(kResidual, y) + x, select(seen, there - here, V{}));
       store(slot(kAlongX, y) + x, select(seen, row.along_x(at), V{}));
       store(slot(kAlongY, y) + x, select(seen, row.along_y(at), V{}));
@@ -193,18 +193,19 @@ void view_costs(const ViewGeometry& view, const ViewCosts& c, bool reset, int fi
       const V u = ramp() + static_cast<float>(x);
       const V grey = load(c.first.row(y) + x);
       const V own = load(c.distance[0].row(y) + x);
-      const auto cost_of = [&](V d, V& cost, V& count) {
+      const auto cost_of = [&](V d, I needed, V& cost, V& count) {
         const Point at = row.at(u, d);
         const V inside_x = clamp(at.x, 0, right);
         const V inside_y = clamp(at.y, 0, bottom);
         const I inside = at.used & I(inside_x == at.x) & I(inside_y == at.y);
-        const V r = abs(bilinear(c.second.data, c.second.stride, inside_x, inside_y) - grey);
+        const V there = bilinear(c.second.data, c.second.stride, inside_x, inside_y, inside & needed);
+        const V r = abs(there - grey);
         cost = select(inside, min(r, set(kTruncated)), V{});
         count = select(inside, set(1.0F), V{});
       };
       V cost[ViewCosts::kRivals];
       V count[ViewCosts::kRivals];
-      cost_of(own, cost[0], count[0]);
+      cost_of(own, set(-1), cost[0], count[0]);
       for (int i = 1; i < ViewCosts::kRivals; ++i) {
         const V d = load(c.distance[i].row(y) + x);
         const I same = I(abs(d - own) <= c.same);
@@ -213,7 +214,7 @@ void view_costs(const ViewGeometry& view, const ViewCosts& c, bool reset, int fi
         if (all(same)) continue;
         V other;
         V seen;
-        cost_of(d, other, seen);
+        cost_of(d, ~same, other, seen);
         cost[i] = select(same, cost[0], other);
         count[i] = select(same, count[0], seen);
       }

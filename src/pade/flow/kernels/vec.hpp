@@ -13,9 +13,11 @@ using simd::PADE_ISA::gather;
 using simd::PADE_ISA::gather_pairs;
 using simd::PADE_ISA::I;
 using simd::PADE_ISA::kLanes;
+using simd::PADE_ISA::kPicks;
 using simd::PADE_ISA::load;
 using simd::PADE_ISA::max;
 using simd::PADE_ISA::min;
+using simd::PADE_ISA::pick;
 using simd::PADE_ISA::ramp;
 using simd::PADE_ISA::select;
 using simd::PADE_ISA::set;
@@ -27,55 +29,67 @@ using simd::PADE_ISA::V;
 
 static_assert(kRowMultiple % (2 * kLanes) == 0);
 
-// out[i] = planes[i][at]. Flow is smooth: most indices count up by one from the first lane on, or jump once
-// in between, and plain loads take the place of slow gathers. Planes have a spare row behind their end.
+inline constexpr int kOffsets = kLanes - 1;  // bits of an index into a vector
+
+// out[i] = planes[i][at] where `needed`, by plain loads in place of slow gathers; false where `at` does not
+// allow that. Flow is smooth: most indices lie in the window of kLanes neighbours that begins with the first
+// one, or in that which ends with the last one. Planes have a spare row behind their end.
+template <int kCount>
+PADE_INLINE bool fetch_near(const float* const (&planes)[kCount], I at, I needed, V (&out)[kCount]) {
+  const int from_first = at[0];
+  if constexpr (kPicks) {
+    const int from_last = at[kLanes - 1] - kOffsets;
+    const I in_first = at - from_first;
+    const I in_last = at - from_last;
+    const I first_has = (in_first & ~kOffsets) == 0;
+    const I last_has = (in_last & ~kOffsets) == 0;
+    // No branch between one window and two: which of them it is cannot be foretold, and costs more than a
+    // load.
+    if (!(from_last >= 0 && all(first_has | last_has | ~needed))) return false;
+    for (int i = 0; i < kCount; ++i) {
+      out[i] = select(first_has, pick(load(planes[i] + from_first), in_first),
+                      pick(load(planes[i] + from_last), in_last));
+    }
+    return true;
+  }
+  // Without pick(): indices that count up by one, or jump once in between.
+  const I start = at - truncate(ramp());
+  const I like_first = start == from_first;
+  const int from_last = start[kLanes - 1];
+  if (!(from_last >= 0 && all(like_first | (start == from_last)))) return false;
+  for (int i = 0; i < kCount; ++i)
+    out[i] = select(like_first, load(planes[i] + from_first), load(planes[i] + from_last));
+  return true;
+}
+
+// out[i] = planes[i][at].
 template <int kCount>
 PADE_INLINE void fetch(const float* const (&planes)[kCount], I at, V (&out)[kCount]) {
-  const I start = at - truncate(ramp());
-  const I like_first = start == start[0];
-  const int from_first = start[0];
-  const int from_last = start[kLanes - 1];
-  if (all(like_first)) {
-    for (int i = 0; i < kCount; ++i) out[i] = load(planes[i] + from_first);
-  } else if (from_last >= 0 && all(like_first | (start == from_last))) {
-    for (int i = 0; i < kCount; ++i)
-      out[i] = select(like_first, load(planes[i] + from_first), load(planes[i] + from_last));
-  } else {
-    for (int i = 0; i < kCount; ++i) out[i] = gather(planes[i], at);
-  }
+  if (fetch_near(planes, at, set(-1), out)) return;
+  for (int i = 0; i < kCount; ++i) out[i] = gather(planes[i], at);
 }
 
-// The same for a pixel, its right neighbour, and both below.
-PADE_INLINE void fetch_corners(const float* plane, int stride, I at, V (&out)[4]) {
-  const I start = at - truncate(ramp());
-  const I like_first = start == start[0];
-  const int from_first = start[0];
-  const int from_last = start[kLanes - 1];
-  const float* const corners[4] = {plane, plane + 1, plane + stride, plane + stride + 1};
-  if (all(like_first)) {
-    for (int i = 0; i < 4; ++i) out[i] = load(corners[i] + from_first);
-  } else if (from_last >= 0 && all(like_first | (start == from_last))) {
-    for (int i = 0; i < 4; ++i)
-      out[i] = select(like_first, load(corners[i] + from_first), load(corners[i] + from_last));
-  } else {
-    gather_pairs(plane, at, out[0], out[1]);
-    gather_pairs(plane + stride, at, out[2], out[3]);
-  }
-}
-
-// The bilinear value of a plane at (x, y), which must lie in [0, width - 1] x [0, height - 1]. Rows have a
-// spare element behind their end and planes a spare row, so that the far corner needs no test.
-PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
+// The bilinear value of a plane at (x, y), which must lie in [0, width - 1] x [0, height - 1]; any value
+// where it is not `needed`. Rows have a spare element behind their end and planes a spare row, so that the
+// far corner needs no test.
+PADE_INLINE V bilinear(const float* plane, int stride, V x, V y, I needed) {
   const I ix = truncate(x);
   const I iy = truncate(y);
   const V ax = x - to_float(ix);
   const V ay = y - to_float(iy);
   const I at = iy * stride + ix;
+  const float* const corners[4] = {plane, plane + 1, plane + stride, plane + stride + 1};
   V v[4];
-  fetch_corners(plane, stride, at, v);
+  if (!fetch_near(corners, at, needed, v)) {
+    gather_pairs(plane, at, v[0], v[1]);
+    gather_pairs(plane + stride, at, v[2], v[3]);
+  }
   const V top = v[0] + ax * (v[1] - v[0]);
   const V bottom = v[2] + ax * (v[3] - v[2]);
   return top + ay * (bottom - top);
+}
+PADE_INLINE V bilinear(const float* plane, int stride, V x, V y) {
+  return bilinear(plane, stride, x, y, set(-1));
 }
 
 // A window's radius that the compiler knows, so that loops over taps unroll and taps stay in registers.

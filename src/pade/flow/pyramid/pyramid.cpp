@@ -117,8 +117,13 @@ void halve_flow(const FlowPlanes& fine, FlowPlanes& coarse) {
 cv::Mat to_vectors(const FlowPlanes& flow) {
   cv::Mat vectors(flow.u.height(), flow.u.width(), CV_32FC2);
   for (int y = 0; y < vectors.rows; ++y) {
-    auto* to = vectors.ptr<cv::Vec2f>(y);
-    for (int x = 0; x < vectors.cols; ++x) to[x] = {flow.u.row(y)[x], flow.v.row(y)[x]};
+    auto* to = vectors.ptr<float>(y);
+    const float* const u = flow.u.row(y);
+    const float* const v = flow.v.row(y);
+    for (int x = 0; x < vectors.cols; ++x) {
+      to[2 * x] = u[x];
+      to[2 * x + 1] = v[x];
+    }
   }
   return vectors;
 }

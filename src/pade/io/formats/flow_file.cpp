@@ -9,9 +9,9 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/io/atomic_output.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/text.hpp"
 
 namespace pade::io {
@@ -38,7 +38,7 @@ std::uint64_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
   return value;
 }
 
-// Whether the bytes can be a PNG of 16-bit RGB at all. OpenCV's decoder would take any format, and believe
+// Whether the bytes can be a PNG of 16-bit RGB at all. The decoder would take any format, and believe
 // any size.
 Status check_png_header(std::span<const std::uint8_t> bytes, std::string_view name) {
   constexpr std::array<std::uint8_t, 16> start = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n',
@@ -113,14 +113,9 @@ std::vector<std::uint8_t> encode_flo(const cv::Mat& vectors) {
 
 Result<cv::Mat> decode_kitti_flow(std::span<const std::uint8_t> bytes, std::string_view name) {
   if (const Status header = check_png_header(bytes, name); !header) return header.error();
-  cv::Mat png;
-  try {  // the decoder may throw
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<std::uint8_t*>(bytes.data()));
-    png = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception& failure) {
-    return Error{fmt::format("{}: {}", name, failure.err)};
-  }
-  if (png.empty()) return Error{fmt::format("{}: not a readable PNG", name)};
+  const auto decoded = decode_image(bytes, Pixels::stored);
+  if (!decoded) return Error{fmt::format("{}: {}", name, decoded.error().message)};
+  const cv::Mat& png = *decoded;
   if (png.type() != CV_16UC3) {
     return Error{fmt::format("{}: {} channels of {} bytes, expected a KITTI flow PNG with 3 of 2", name,
                              png.channels(), png.elemSize1())};
@@ -151,9 +146,7 @@ std::vector<std::uint8_t> encode_kitti_flow(const cv::Mat& vectors) {
                                  static_cast<std::uint16_t>(std::lround(code[0]))};
     }
   }
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", png, bytes);
-  return bytes;
+  return encode_png(png);
 }
 
 Result<cv::Mat> read_flow(const std::filesystem::path& file) {

@@ -13,22 +13,27 @@
 
 namespace pade::io {
 
-/// What a file of raw GNSS holds, by its first line.
+/// What a file of raw GNSS holds, by its first line; of UBX by a message of raw measurements near its start.
 enum class RawGnssKind { observations, navigation, known_ranges, ubx };
 
-/// Empty if the text is nothing of the kind.
+/// Bytes of a file that tell its kind.
+constexpr std::size_t kRawGnssStart = 65536;
+
+/// Empty if the text, of which no more than kRawGnssStart bytes are looked at, is nothing of the kind.
 std::optional<RawGnssKind> raw_gnss_kind(std::string_view text);
 
 /// Appends the epochs of a RINEX observation file (3.00 to 3.05). Satellites of other systems than ours are
-/// passed over. Left out, with a remark: epochs that are cut off, repeat a time, or go back; satellites whose
-/// line cannot be read; all behind a second header of another version. Errors: no header or one of another
-/// version or type, no observation types, a time system that is not known, no epoch.
-/// `name` stands in messages.
+/// passed over; BeiDou's 1I, 1Q and (before 3.04) 1X are called 2I, 2Q and 2X. Left out, with a remark:
+/// epochs that are cut off, repeat a time, or go back, or lie ahead of more epochs behind them; satellites
+/// whose line cannot be read; all behind a second header of another version. Errors: no header or one of
+/// another version or type, no observation types, a time system that is not known, no epoch. `name` stands in
+/// messages.
 Status parse_rinex_observations(std::string_view text, std::string_view name, gnss::RawLog& log);
 
 /// Appends the ephemerides of a RINEX navigation file (3.00 to 3.05) of one system or mixed. Left out, with a
-/// remark: records that are cut off or have values that no orbit has. Errors: no header or one of another
-/// version or type, no ephemeris.
+/// remark: records that are cut off or have values that no orbit has. Blanks cut off at a line's end are no
+/// fault, and a file without a record of our systems is a remark. Errors: no header or one of another
+/// version or type, records none of which is usable.
 Status parse_rinex_navigation(std::string_view text, std::string_view name, gnss::RawLog& log);
 
 /// Appends `pseudorange3` lines as known ranges, `odom3` lines as odometry and `point3` lines as true
@@ -38,12 +43,14 @@ Status parse_known_ranges(std::string_view text, std::string_view name, gnss::Ra
 
 /// Appends the epochs (RXM-RAWX) of a UBX log, and what GPS satellites sent (RXM-SFRBX); the messages of
 /// other systems are not decoded, which a remark says. Left out, with a remark: messages with a wrong
-/// checksum, that are cut off or not as long as they say, epochs that repeat a time or go back. Other
-/// messages and text between them are passed over. Errors: no epoch.
+/// checksum, that are cut off or not as long as they say, epochs that repeat a time or go back, or lie ahead
+/// of more epochs behind them. A phase has lost lock where its lock time is shorter than before, or than the
+/// time since. Other messages and text before and between them are passed over. Errors: no epoch.
 Status parse_ubx(std::string_view bytes, std::string_view name, gnss::RawLog& log);
 
 /// Reads a folder, or the folder of a file: with a file its observations (or known ranges) alone, with a
 /// folder all that there are; in both cases all navigation files, and files of known positions, beside them.
+/// A navigation file that cannot be used is a remark, as is that no model of the ionosphere was found.
 /// Errors: no observations; observations without any ephemeris.
 Result<gnss::RawLog> read_raw_gnss(const std::filesystem::path& path);
 

@@ -102,6 +102,32 @@ std::optional<RawGnssKind> kind_of(const fs::path& path) {
   return text ? raw_gnss_kind(*text) : std::nullopt;
 }
 
+/// Whether a UBX message of raw measurements (RXM-RAWX) with the right checksum lies in the text.
+bool has_raw_ubx(std::string_view text) {
+  constexpr std::string_view kStart("\xB5\x62\x02\x15", 4);
+  const auto byte = [&](std::size_t at) {
+    return static_cast<unsigned>(static_cast<unsigned char>(text[at]));
+  };
+  for (std::size_t at = text.find(kStart); at != std::string_view::npos; at = text.find(kStart, at + 1)) {
+    if (text.size() - at < 8) return false;
+    const std::size_t end = at + 6 + (byte(at + 4) | byte(at + 5) << 8U);
+    if (end + 2 > text.size()) continue;
+    unsigned a = 0, b = 0;
+    for (std::size_t i = at + 2; i < end; ++i) {
+      a = (a + byte(i)) & 0xFFU;
+      b = (b + a) & 0xFFU;
+    }
+    if (byte(end) == a && byte(end + 1) == b) return true;
+  }
+  return false;
+}
+
+/// A recording of another kind, which may have messages of a receiver in it.
+bool is_recording(std::string_view text) {
+  return text.starts_with("#ROSBAG") || text.starts_with("\x89MCAP") || text.starts_with("ULog") ||
+         text.starts_with("SQLite format");
+}
+
 Files files_in(const fs::path& folder) {
   std::vector<fs::path> all;
   std::error_code failure;
@@ -117,6 +143,24 @@ Files files_in(const fs::path& folder) {
     if (kind == RawGnssKind::known_ranges) files.ranges.push_back(path);
   }
   return files;
+}
+
+/// One that gives nothing is named: another beside it may have what is needed.
+void read_navigation(const std::vector<fs::path>& files, gnss::RawLog& log) {
+  for (const fs::path& file : files) {
+    const auto text = read_file(file);
+    const Status parsed = text ? parse_rinex_navigation(*text, file.string(), log) : Status(text.error());
+    if (!parsed) log.remarks.push_back(parsed.error().message + "; the file is left out");
+  }
+}
+
+/// What has been said, behind a message.
+std::string with_remarks(const std::vector<std::string>& remarks) {
+  constexpr std::size_t kMost = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(remarks.size(), kMost); ++i) text += "; " + remarks[i];
+  if (remarks.size() > kMost) text += fmt::format("; and {} more remarks", remarks.size() - kMost);
+  return text;
 }
 
 template <class Parse>
@@ -144,6 +188,7 @@ std::optional<RawGnssKind> raw_gnss_kind(std::string_view text) {
     return std::nullopt;
   }
   if (text.starts_with("\xB5\x62")) return RawGnssKind::ubx;
+  if (!is_recording(text) && has_raw_ubx(text.substr(0, kRawGnssStart))) return RawGnssKind::ubx;
   const auto fields = split_fields(line);
   if (fields.size() < 4) return std::nullopt;
   const auto begins = [&](const LineKind& kind) { return kind.word == fields.front(); };
@@ -197,8 +242,8 @@ Result<gnss::RawLog> read_raw_gnss(const std::filesystem::path& path) {
                              files.observations.size(), files.observations.front().string())};
   }
   gnss::RawLog log;
-  for (const Status& read : {read_all(files.navigation, parse_rinex_navigation, log),
-                             read_all(files.observations, parse_observations, log),
+  read_navigation(files.navigation, log);
+  for (const Status& read : {read_all(files.observations, parse_observations, log),
                              read_all(files.ranges, parse_known_ranges, log)}) {
     if (!read) return read.error();
   }
@@ -209,7 +254,14 @@ Result<gnss::RawLog> read_raw_gnss(const std::filesystem::path& path) {
   }
   if (!log.epochs.empty() && log.broadcast.kepler.empty() && log.broadcast.glonass.empty()) {
     return Error{fmt::format(
-        "{}: found observations but no ephemeris: no RINEX 3 navigation file beside them", path.string())};
+        "{}: found observations but no ephemeris: no RINEX 3 navigation file beside them that gives one{}",
+        path.string(), with_remarks(log.remarks))};
+  }
+  if (!log.epochs.empty() && !log.broadcast.ionosphere) {
+    log.remarks.push_back(
+        "no model of the ionosphere (GPSA and GPSB of a navigation file, or page 18 of GPS's message, which "
+        "comes every 12.5 minutes): a delay of 5 m in the zenith is assumed, and taken to be wrong by as "
+        "much");
   }
   return log;
 }

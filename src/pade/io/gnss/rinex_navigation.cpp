@@ -30,6 +30,8 @@ std::string defect_of(const gnss::KeplerEphemeris& e) {
     return fmt::format("toe = {}, expected 0 to 604800", e.toe_of_week);
   }
   if (!(std::abs(e.af0) < 0.1)) return fmt::format("af0 = {}, expected less than 0.1 s", e.af0);
+  if (!(std::abs(e.group_delay) < 1e-6))  // the messages have room for 0.12 µs
+    return fmt::format("a group delay of {} s, expected less than 1e-6", e.group_delay);
   return {};
 }
 
@@ -40,14 +42,17 @@ namespace {
 using namespace rinex;  // NOLINT: the file is about nothing else
 
 constexpr std::size_t kMostValues = 40;
-constexpr int kBeidouBehind = 14;  // seconds of BeiDou time behind GPS time
+constexpr std::size_t kOfFirstLine = 3;  // numbers behind the date
+constexpr std::size_t kOfLine = 4;       // numbers of each further line
+constexpr double kNoPromise = 8192;      // accuracy of a satellite that promises nothing, m
+constexpr int kBeidouBehind = 14;        // seconds of BeiDou time behind GPS time
 
 /// One satellite's record: its first line's date and all its numbers, 0 where a column is blank.
 struct Record {
   gnss::SatelliteId satellite;
   Time date;  ///< as written
   std::array<double, kMostValues> values{};
-  std::size_t count = 0;  ///< columns that the lines have, blank or not
+  std::size_t count = 0;  ///< up to the last column that the lines have, blank or not
   std::string bad;        ///< a column that is no number
   std::size_t line = 0;
 };
@@ -73,16 +78,18 @@ std::optional<Time> date_of(std::string_view line) {
   return time_of_date(date[0], date[1], date[2], date[3], date[4], date[5]);
 }
 
-/// The group delay of the first band. Galileo's clock is of E1 and E5a (F/NAV) or of E1 and E5b (I/NAV).
-void set_delay(const Record& record, gnss::KeplerEphemeris& e) {
-  const auto& v = record.values;
-  e.group_delay = v[25];
-  if (e.satellite.system != gnss::System::galileo) return;
-  const auto source = static_cast<unsigned>(std::clamp(v[20], 0.0, 65535.0));
-  const bool of_e5b = (source & 0x200U) != 0 || (source & 0x105U) == 0;
-  if (of_e5b) e.group_delay = v[26];
-  e.second_choice = !of_e5b;
+/// Whether the clock is of E1 and E5b, as Galileo's I/NAV, not of E1 and E5a (F/NAV).
+bool is_of_e5b(const Record& record) {
+  if (record.satellite.system != gnss::System::galileo) return false;
+  const auto source = static_cast<unsigned>(std::clamp(record.values[20], 0.0, 65535.0));
+  return (source & 0x200U) != 0 || (source & 0x105U) == 0;
 }
+
+/// Where the group delay of the first band stands.
+std::size_t place_of_delay(const Record& record) { return is_of_e5b(record) ? 26 : 25; }
+
+/// 0 if it is not said. Galileo's -1 and an accuracy of many kilometres promise nothing.
+double written_accuracy(double written) { return written >= 0 && written < 1e4 ? written : kNoPromise; }
 
 gnss::KeplerEphemeris kepler_of(const Record& record) {
   const auto& v = record.values;
@@ -94,9 +101,10 @@ gnss::KeplerEphemeris kepler_of(const Record& record) {
   e.toe_of_week = v[11], e.cic = v[12], e.omega0 = v[13], e.cis = v[14];
   e.i0 = v[15], e.crc = v[16], e.omega = v[17], e.omega_dot = v[18];
   e.idot = v[19];
-  e.accuracy = v[23] > 0 && v[23] < 1e4 ? v[23] : 0;
+  e.accuracy = written_accuracy(v[23]);
   e.health = static_cast<int>(std::clamp(v[24], 0.0, 1e6));
-  set_delay(record, e);
+  e.group_delay = v.at(place_of_delay(record));
+  e.second_choice = record.satellite.system == gnss::System::galileo && !is_of_e5b(record);
   e.toc = record.date;
   e.toe = nearest_week(std::clamp(e.toe_of_week, 0.0, 604800.0), record.date);
   if (e.satellite.system == gnss::System::beidou) {
@@ -140,7 +148,7 @@ std::string defect_of(const gnss::GlonassEphemeris& e) {
 /// Appends the ephemeris, or says why not.
 std::string keep(const Record& record, gnss::BroadcastData& broadcast) {
   const bool glonass = record.satellite.system == gnss::System::glonass;
-  const std::size_t needed = glonass ? 15 : 27;
+  const std::size_t needed = glonass ? 14 : place_of_delay(record) + 1;  // up to the last one that counts
   if (record.count < needed) return fmt::format("{} numbers, expected {}", record.count, needed);
   if (!record.bad.empty()) return record.bad + ", expected a number";
   if (glonass) {
@@ -190,7 +198,7 @@ Status parse_rinex_navigation(std::string_view text, std::string_view name, gnss
   if (!version) return version.error();
   if (Status read = read_header(lines, name, log); !read) return read;
   Tally bad;
-  std::size_t kept = 0;
+  std::size_t kept = 0, refused = 0;
   while (const auto line = lines.next()) {
     if (label_of(*line) == "RINEX VERSION / TYPE") {
       log.remarks.push_back(
@@ -202,8 +210,12 @@ Status parse_rinex_navigation(std::string_view text, std::string_view name, gnss
     Record record;
     record.line = lines.number();
     add_values(*line, 23, record);
+    std::size_t before = kOfFirstLine;
     for (auto more = lines.peek(); more && more->starts_with("    "); more = lines.peek()) {
+      // Blanks at the end of the line before may be cut off; its columns are there all the same.
+      record.count = std::min(kMostValues, before);
       add_values(*lines.next(), 4, record);
+      before += kOfLine;
     }
     if (foreign || columns(*line, 0, line->size()).empty()) continue;
     const auto date = date_of(*line);
@@ -215,11 +227,17 @@ Status parse_rinex_navigation(std::string_view text, std::string_view name, gnss
       defect = keep(record, log.broadcast);
     }
     if (defect.empty()) ++kept;
-    if (!defect.empty())
-      bad.add(fmt::format("{}: found {}; the ephemeris is left out", at_line(name, record.line), defect));
+    if (defect.empty()) continue;
+    ++refused;
+    bad.add(fmt::format("{}: found {}; the ephemeris is left out", at_line(name, record.line), defect));
   }
   bad.report(log.remarks);
   if (kept > 0) return {};
+  if (refused == 0) {  // another file may have what this one has not
+    log.remarks.push_back(
+        fmt::format("{}: no ephemeris of GPS, GLONASS, Galileo or BeiDou in it, left out", name));
+    return {};
+  }
   return Error{fmt::format("{}: found no usable ephemeris{}", name,
                            log.remarks.empty() ? "" : "; " + log.remarks.back())};
 }

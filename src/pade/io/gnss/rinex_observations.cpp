@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/gnss/epoch_order.hpp"
 #include "pade/io/gnss/raw_gnss_files.hpp"
 #include "pade/io/gnss/rinex_text.hpp"
 #include "pade/io/text.hpp"
@@ -23,6 +24,7 @@ struct Header {
   std::map<char, std::vector<std::string>> types;  ///< "C1C", ... by system
   std::int64_t ahead_of_gps = 0;                   ///< of the time system, s; what is to be subtracted
   bool utc = false;                                ///< the times are UTC (GLONASS)
+  double version = 3.04;
 };
 
 Status set_time_system(std::string_view name, Header& header) {
@@ -39,6 +41,16 @@ Status set_time_system(std::string_view name, Header& header) {
   return {};
 }
 
+/// BeiDou's B1I is 2I since RINEX 3.03, and 1I in 3.02 (so are Q and both together, X). From 3.04 on 1X is
+/// B1C.
+std::string type_of(std::string_view written, char system, double version) {
+  std::string type(written);
+  const bool first = system == 'C' && type[1] == '1';
+  const bool of_b1i = type[2] == 'I' || type[2] == 'Q' || (type[2] == 'X' && version < 3.035);
+  if (first && of_b1i) type[1] = '2';
+  return type;
+}
+
 /// One line of "SYS / # / OBS TYPES"; those that continue have a blank in place of the system.
 Status add_types(std::string_view line, char& system, Header& header) {
   if (line[0] != ' ') {
@@ -52,7 +64,7 @@ Status add_types(std::string_view line, char& system, Header& header) {
   }
   for (std::size_t i = 0; i < 13 && system != ' '; ++i) {
     const std::string_view type = columns(line, 7 + 4 * i, 3);
-    if (type.size() == 3) header.types[system].emplace_back(type);
+    if (type.size() == 3) header.types[system].push_back(type_of(type, system, header.version));
   }
   return {};
 }
@@ -167,7 +179,7 @@ void add_signals(std::string_view line, gnss::SatelliteId satellite, const std::
 class Body {
  public:
   Body(std::string_view name, Header header, gnss::RawLog& log)
-      : name_(name), header_(std::move(header)), log_(log) {}
+      : name_(name), header_(std::move(header)), log_(log), order_(name, "line", log) {}
 
   void read(Lines& lines) {
     while (const auto line = lines.next()) {
@@ -180,9 +192,10 @@ class Body {
                                    at_line(name_, lines.number()), in_quotes(*line)));
       }
     }
-    for (const Tally* tally : {&bad_lines_, &repeated_, &backward_, &bad_satellites_, &cut_off_}) {
-      tally->report(log_.remarks);
-    }
+    bad_lines_.report(log_.remarks);
+    order_.finish();
+    bad_satellites_.report(log_.remarks);
+    cut_off_.report(log_.remarks);
   }
 
  private:
@@ -191,6 +204,7 @@ class Body {
     const std::string where = at_line(name_, lines.number());
     const auto version = check_first_line(line, 'O', where);
     Header next;
+    next.version = version ? *version : next.version;
     const Status read = version ? read_header(lines, name_, next) : Status(version.error());
     if (read) {
       header_ = next;
@@ -203,7 +217,8 @@ class Body {
 
   bool read_epoch(std::string_view line, Lines& lines) {
     const auto epoch = parse_epoch_line(line, header_);
-    const std::string where = at_line(name_, lines.number());
+    const std::size_t number = lines.number();
+    const std::string where = at_line(name_, number);
     if (!epoch) {
       bad_lines_.add(
           fmt::format("{}: found {}, expected > date, flag and number of satellites; the epoch is left out",
@@ -226,7 +241,7 @@ class Body {
     // A power failure between the epochs: no phase goes on.
     if (epoch->flag == 1)
       std::for_each(data.signals.begin(), data.signals.end(), [](auto& s) { s.lost_lock = true; });
-    keep(std::move(data), where);
+    order_.add(std::move(data), number);
     return true;
   }
 
@@ -248,16 +263,6 @@ class Body {
       return;
     }
     add_signals(line, *satellite, types->second, data);
-  }
-
-  void keep(gnss::Epoch data, const std::string& where) {
-    if (!log_.epochs.empty() && data.time == log_.epochs.back().time) {
-      repeated_.add(fmt::format("{}: the time of the epoch before once more, left out", where));
-    } else if (!log_.epochs.empty() && data.time < log_.epochs.back().time) {
-      backward_.add(fmt::format("{}: earlier than the epoch before, left out", where));
-    } else {
-      log_.epochs.push_back(std::move(data));
-    }
   }
 
   /// Lines of an event; flag 4 has lines of a header.
@@ -286,7 +291,8 @@ class Body {
   std::string_view name_;
   Header header_;
   gnss::RawLog& log_;
-  Tally bad_lines_, repeated_, backward_, bad_satellites_, cut_off_;
+  EpochOrder order_;
+  Tally bad_lines_, bad_satellites_, cut_off_;
 };
 
 }  // namespace
@@ -296,6 +302,7 @@ Status parse_rinex_observations(std::string_view text, std::string_view name, gn
   const auto first = check_first_line(lines.next().value_or(""), 'O', at_line(name, 1));
   if (!first) return first.error();
   Header header;
+  header.version = *first;
   if (Status read = read_header(lines, name, header); !read) return read;
   const std::size_t before = log.epochs.size();
   Body(name, std::move(header), log).read(lines);

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/io/gnss/epoch_order.hpp"
 #include "pade/io/gnss/gps_message.hpp"
 #include "pade/io/gnss/raw_gnss_files.hpp"
 #include "pade/io/gnss/rinex_text.hpp"
@@ -79,17 +80,41 @@ std::array<char, 2> code_of(gnss::System system, unsigned signal) {
   return signal < names.size() ? names.at(signal) : kNone;
 }
 
+/// How long a signal has been followed at an epoch.
+struct Lock {
+  unsigned milliseconds = 0;  ///< the field ends at 64500
+  Time time;
+};
+
+/// Whether the signal was lost between two epochs: it is followed for a shorter time than before, or than has
+/// gone by.
+bool is_lost(const Lock& before, const Lock& now) {
+  constexpr double kMost = 64500;
+  constexpr double kExact = 0.99;  // of the time, to which the field is taken to be right
+  const double gone = 1e3 * seconds_between(before.time, now.time);
+  return now.milliseconds < before.milliseconds || now.milliseconds < kExact * std::min(gone, kMost);
+}
+
+/// What a GPS satellite sent, and where in the log it stands.
+struct Subframe {
+  std::size_t place = 0;
+  GpsMessage::Words words;
+};
+
 /// Reads the messages of a log in their order.
 class Log {
  public:
-  Log(std::string_view name, gnss::RawLog& log) : name_(name), log_(log) {}
+  Log(std::string_view name, gnss::RawLog& log) : name_(name), log_(log), order_(name, "byte", log) {}
 
   void read(std::string_view bytes) {
     std::size_t at = bytes.find("\xB5\x62");
     while (at != std::string_view::npos) {
       at = bytes.find("\xB5\x62", at + read_message(bytes, at));
     }
-    for (const rinex::Tally* tally : {&damaged_, &misread_, &order_}) tally->report(log_.remarks);
+    damaged_.report(log_.remarks);
+    misread_.report(log_.remarks);
+    order_.finish();
+    decode_subframes();
     if (foreign_messages_ > 0) {
       log_.remarks.push_back(
           fmt::format("{}: {} navigation messages of Galileo, BeiDou and GLONASS are not decoded; a RINEX "
@@ -123,7 +148,7 @@ class Log {
     }
     const Payload payload(bytes.substr(at + 6, length));
     if (head.byte(2) == 0x02 && head.byte(3) == 0x15) read_measurements(payload, at);
-    if (head.byte(2) == 0x02 && head.byte(3) == 0x13) read_subframe(payload);
+    if (head.byte(2) == 0x02 && head.byte(3) == 0x13) read_subframe(payload, at);
     return length + kFrame;
   }
 
@@ -144,14 +169,7 @@ class Log {
     epoch.time.nanoseconds = static_cast<std::int64_t>(week) * kWeekOfNanoseconds +
                              static_cast<std::int64_t>(std::llround(of_week * 1e9));
     for (std::size_t i = 0; i < count; ++i) add_signal(p, kRawxHeader + i * kMeasurement, epoch);
-    if (!log_.epochs.empty() && epoch.time <= log_.epochs.back().time) {
-      order_.add(
-          fmt::format("{}: the epoch at byte {} is not later than the one before, left out", name_, at));
-      return;
-    }
-    for (GpsMessage::Words& words : waiting_) decode(words, epoch.time);
-    waiting_.clear();
-    log_.epochs.push_back(std::move(epoch));
+    order_.add(std::move(epoch), at);
   }
 
   void add_signal(const Payload& p, std::size_t at, gnss::Epoch& epoch) {
@@ -170,13 +188,13 @@ class Log {
     signal.cn0 = p.byte(at + 26);
     signal.half_cycle = (tracked & 4U) == 0;
     const auto locked = static_cast<unsigned>(p.whole(at + 24, 2));
-    auto [before, first] = locked_.try_emplace({*satellite, signal.code}, locked);
-    signal.lost_lock = locked == 0 || (!first && locked < before->second);
-    before->second = locked;
+    auto [before, first] = locked_.try_emplace({*satellite, signal.code}, Lock{locked, epoch.time});
+    signal.lost_lock = locked == 0 || (!first && is_lost(before->second, {locked, epoch.time}));
+    before->second = {locked, epoch.time};
     epoch.signals.push_back(signal);
   }
 
-  void read_subframe(const Payload& p) {
+  void read_subframe(const Payload& p, std::size_t at) {
     if (p.size() < 8) return;
     const std::size_t words = p.byte(4);
     const auto satellite = satellite_of(p.byte(0), p.byte(1));
@@ -190,21 +208,28 @@ class Log {
     for (std::size_t i = 0; i < 10; ++i) {
       subframe.data.at(i) = static_cast<std::uint32_t>(p.whole(8 + 4 * i, 4) >> 6U) & 0xFFFFFFU;
     }
-    if (log_.epochs.empty()) {
-      if (waiting_.size() < 1000) waiting_.push_back(subframe);
-    } else {
-      decode(subframe, log_.epochs.back().time);
-    }
+    subframes_.push_back({at, subframe});
   }
 
-  void decode(const GpsMessage::Words& subframe, Time near) { message_.add(subframe, near, log_.broadcast); }
+  /// Once it is known which epochs stay: they say which week it is.
+  void decode_subframes() {
+    const std::vector<std::size_t>& places = order_.places();
+    if (places.empty()) return;
+    const std::size_t first = log_.epochs.size() - places.size();
+    std::size_t next = 1;
+    for (const Subframe& subframe : subframes_) {
+      while (next < places.size() && places[next] < subframe.place) ++next;
+      message_.add(subframe.words, log_.epochs[first + next - 1].time, log_.broadcast);
+    }
+  }
 
   std::string_view name_;
   gnss::RawLog& log_;
   GpsMessage message_;
-  std::vector<GpsMessage::Words> waiting_;  ///< until an epoch says which week it is
-  std::map<std::pair<gnss::SatelliteId, std::array<char, 2>>, unsigned> locked_;  ///< ms
-  rinex::Tally damaged_, misread_, order_;
+  std::vector<Subframe> subframes_;
+  std::map<std::pair<gnss::SatelliteId, std::array<char, 2>>, Lock> locked_;
+  EpochOrder order_;
+  rinex::Tally damaged_, misread_;
   std::size_t foreign_messages_ = 0;
 };
 

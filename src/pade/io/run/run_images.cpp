@@ -4,17 +4,15 @@
 #include <cmath>
 #include <limits>
 
-#include <opencv2/imgcodecs.hpp>
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::io {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-PngBytes encode_png(const cv::Mat& image) {
-  PngBytes bytes;
-  cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  return bytes;
+PngBytes encode_stacked(const cv::Mat& image) {
+  return io::encode_png(image, {.level = 1, .runs_only = false, .left_filter = false});
 }
 
 /// 0 where there is no positive value, else what `counts` makes of it, up to 65535.
@@ -29,7 +27,7 @@ PngBytes encode_counts(const cv::Mat& metres, Counts counts) {
       out[x] = some ? static_cast<std::uint16_t>(std::min(counts(in[x]), 65535.0)) : std::uint16_t{0};
     }
   }
-  return encode_png(image);
+  return encode_stacked(image);
 }
 
 }  // namespace
@@ -52,6 +50,6 @@ cv::Mat metres_of(const cv::Mat& counts, double scale) {
   return metres;
 }
 
-PngBytes encode_image(const cv::Mat& image) { return encode_png(image); }
+PngBytes encode_image(const cv::Mat& image) { return encode_stacked(image); }
 
 }  // namespace pade::io

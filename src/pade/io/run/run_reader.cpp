@@ -5,8 +5,8 @@
 #include <system_error>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/run/run_images.hpp"
 #include "pade/io/run/run_writer.hpp"
 #include "pade/io/text.hpp"
@@ -36,10 +36,7 @@ Result<cv::Mat> read_png(const Run& run, std::string_view stack, Time time, int 
   const Result<std::string> bytes = read_file(path);
   if (!bytes) return bytes.error();
   cv::Mat image;
-  if (!bytes->empty()) {
-    const cv::Mat raw(1, static_cast<int>(bytes->size()), CV_8UC1, const_cast<char*>(bytes->data()));
-    image = cv::imdecode(raw, cv::IMREAD_UNCHANGED);
-  }
+  if (auto decoded = decode_image(image_bytes(*bytes), Pixels::stored)) image = std::move(*decoded);
   if (image.type() != type || image.size() != run.info.camera.size() || image.empty()) {
     return Error{
         fmt::format("{}: found {}, expected a PNG of {} x {} pixels of {} bits", path.string(),

@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/sequence/image_file.hpp"
 #include "pade/io/text.hpp"
 
@@ -61,16 +61,10 @@ void convert(std::string_view bytes, cv::Mat& depth) {
 
 /// Four channels of a byte are a float; empty where the image is none such.
 cv::Mat float_of_bytes(const std::string& bytes) {
-  cv::Mat image;
-  try {
-    const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-    image = cv::imdecode(coded, cv::IMREAD_UNCHANGED);
-  } catch (const std::exception&) {
-    return {};
-  }
-  if (image.type() != CV_8UC4 || !image.isContinuous()) return {};
-  cv::Mat depth(image.size(), CV_32FC1);
-  std::memcpy(depth.data, image.data, image.total() * image.elemSize());
+  const auto image = decode_image(image_bytes(bytes), Pixels::stored);
+  if (!image || image->type() != CV_8UC4 || !image->isContinuous()) return {};
+  cv::Mat depth(image->size(), CV_32FC1);
+  std::memcpy(depth.data, image->data, image->total() * image->elemSize());
   return depth;
 }
 

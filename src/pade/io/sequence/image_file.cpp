@@ -12,9 +12,9 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/io/crc32.hpp"
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::io {
 namespace {
@@ -196,21 +196,16 @@ std::optional<Error> png_defect(const Bytes& bytes) {
 }
 
 Result<cv::Mat> decode(const Bytes& bytes) {
-  constexpr std::size_t kShortest = 8;  // fewer bytes hold no header, and OpenCV would print about it
+  constexpr std::size_t kShortest = 8;  // fewer bytes hold no header
   if (bytes.size() < kShortest)
     return Error{fmt::format("cannot be decoded: it has only {} bytes", bytes.size())};
-  cv::Mat image;
-  try {  // OpenCV throws on sizes it refuses and on allocation
-    image = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const std::exception&) {
-    return Error{"cannot be decoded"};
-  }
-  if (image.empty()) return Error{"cannot be decoded, expected PNG, JPEG, PGM, PPM, BMP or TIFF"};
-  if (image.depth() != CV_8U && image.depth() != CV_16U && image.depth() != CV_32F) {
+  auto image = decode_image(bytes, Pixels::opaque);
+  if (!image) return image;
+  if (image->depth() != CV_8U && image->depth() != CV_16U && image->depth() != CV_32F) {
     return Error{"has an unknown number type, expected 8 or 16 bit or 32 bit floating point"};
   }
-  if (image.channels() != 1 && image.channels() != 3) {
-    return Error{fmt::format("has {} channels, expected 1 or 3", image.channels())};
+  if (image->channels() != 1 && image->channels() != 3) {
+    return Error{fmt::format("has {} channels, expected 1 or 3", image->channels())};
   }
   return image;
 }

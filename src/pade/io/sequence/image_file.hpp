@@ -1,5 +1,6 @@
-// Image files: reading them whole or not at all. OpenCV returns a partly grey picture for a file that was cut
-// short; a frame of half an image would put false obstacles into the map, so the file is checked first.
+// Image files: reading them whole or not at all. A decoder may return a partly grey picture for a file that
+// was cut short; a frame of half an image would put false obstacles into the map, so the file is checked
+// first.
 #pragma once
 
 #include <filesystem>

@@ -5,8 +5,8 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
-#include <exception>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -14,13 +14,13 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/videodev2.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/live/camera/folder_source.hpp"
 
 namespace pade::live {
@@ -154,13 +154,8 @@ class Device {
   }
 
   [[nodiscard]] static cv::Mat decoded(void* start, std::size_t bytes) {
-    constexpr std::size_t kShortest = 8;  // fewer hold no header; cameras on a busy bus give none at all
-    if (bytes < kShortest) return {};
-    try {  // OpenCV throws on sizes it refuses and on allocation
-      return cv::imdecode(cv::Mat(1, static_cast<int>(bytes), CV_8UC1, start), cv::IMREAD_COLOR);
-    } catch (const std::exception&) {
-      return {};
-    }
+    auto image = io::decode_image({static_cast<const std::uint8_t*>(start), bytes}, io::Pixels::colour);
+    return image ? std::move(*image) : cv::Mat();
   }
 
   [[nodiscard]] bool take(const v4l2_buffer& buffer, LiveFrame& frame) {

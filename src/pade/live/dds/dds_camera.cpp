@@ -51,6 +51,7 @@ class DdsCamera : public FrameSource {
     if (refused_ > 0) text += fmt::format("{}{} images left out", text.empty() ? "" : "; ", refused_);
     return text;
   }
+  [[nodiscard]] double behind() const override { return shared_.clock.behind(); }
 
  private:
   Outcome await(LiveFrame& frame, int milliseconds) {

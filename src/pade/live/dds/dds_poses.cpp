@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/core/sensors/pose_jumps.hpp"
 #include "pade/io/recording/messages/messages.hpp"
 #include "pade/live/link/bracket.hpp"
 #include "pade/live/link/health.hpp"
@@ -93,38 +94,11 @@ void DdsPoses::take(std::string_view bytes) {
       return refuse("a stamp is not later than the one before");
     jump();
   }
-  if (is_jump(sample)) jump();
+  if (jump_to(samples_, sample.time, sample.pose)) jump();
   samples_.push_back(sample);
   while (seconds_between(samples_.front().time, sample.time) > kPosesKept) samples_.pop_front();
   ++come_;
   problem_.clear();
-}
-
-/// Against what leads on from the two before with the same velocity and rate.
-bool DdsPoses::is_jump(const Sample& next) const {
-  constexpr double kStep = 0.3, kAcceleration = 30, kFirstSpeed = 30;         // m, m/s², m/s
-  constexpr double kTurn = 0.15, kAngularAcceleration = 60, kFirstRate = 10;  // rad, rad/s², rad/s
-  if (samples_.empty()) return false;
-  const Sample& last = samples_.back();
-  const double dt = seconds_between(last.time, next.time);
-  if (dt > kFarthestPosesApart) return false;
-  Pose expected = last.pose;
-  double way = kStep + kFirstSpeed * dt, turn = kTurn + kFirstRate * dt;
-  if (samples_.size() > 1) {
-    const Sample& before = samples_[samples_.size() - 2];
-    const double since = seconds_between(before.time, last.time);
-    if (since <= kFarthestPosesApart) {
-      const double share = dt / since;
-      const Eigen::AngleAxisd turned(before.pose.rotation.conjugate() * last.pose.rotation);
-      expected.translation += share * (last.pose.translation - before.pose.translation);
-      expected.rotation = last.pose.rotation * Eigen::AngleAxisd(share * turned.angle(), turned.axis());
-      const double squared = dt * (dt + since) / 2;
-      way = kStep + kAcceleration * squared;
-      turn = kTurn + kAngularAcceleration * squared;
-    }
-  }
-  return (next.pose.translation - expected.translation).norm() > way ||
-         next.pose.rotation.angularDistance(expected.rotation) > turn;
 }
 
 PoseAnswer DdsPoses::at(Time time) {
@@ -156,7 +130,7 @@ double DdsPoses::turned_since(Time time) {
 std::string DdsPoses::missing() {
   const Time last = newest();
   const bool any = last.nanoseconds != 0;
-  if (any && seconds_between(last, shared_.clock.now()) < kStale) return {};
+  if (any && seconds_between(last, shared_.clock.now()) - behind() < kStale) return {};
   if (!problem_.empty()) return fmt::format("{}: {}", options_.poses, problem_);
   const std::string why = reader_->remark();
   return why.empty() ? fmt::format("nothing on {}{}", options_.poses, any ? " any more" : "") : why;

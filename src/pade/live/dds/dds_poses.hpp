@@ -29,13 +29,14 @@ class DdsPoses : public PoseSource {
            const Pose& T_body_camera);
 
   [[nodiscard]] bool in_our_time() const override { return true; }
+  [[nodiscard]] double behind() const override { return shared_.clock.behind(); }
   /// Messages of the autopilot say nothing of these poses.
   void add(const mavlink::Frame& /*frame*/) override {}
   /// Between two messages: rotation and position each on their straight way. No pose is extrapolated, and
   /// none comes from messages more than 0.25 s apart.
   [[nodiscard]] PoseAnswer at(Time time) override;
   /// How often the poses have jumped: their frame has another name, stamps went back or began anew, or a step
-  /// or turn is not what the motion before leads to.
+  /// or turn is not what the motion before leads to (core/sensors/pose_jumps.hpp).
   [[nodiscard]] std::size_t jumps() const override { return jumps_; }
   [[nodiscard]] Time newest() override;
   [[nodiscard]] std::size_t count() const override { return come_; }
@@ -52,7 +53,6 @@ class DdsPoses : public PoseSource {
   };
   void pull();
   void take(std::string_view bytes);
-  [[nodiscard]] bool is_jump(const Sample& next) const;
   void jump();
   void refuse(std::string why);
 

@@ -15,6 +15,7 @@ namespace pade::live {
 /// Names of the frames of messages.
 struct Frames {
   std::string world, body, camera;
+  std::string map;  ///< of the map, where it has an origin of its own in the world of the poses
 };
 
 /// What frames are called: as messages that come call them, else by our own names. Any thread.
@@ -23,7 +24,7 @@ class FrameNames {
   explicit FrameNames(const DdsOptions& options) {
     const std::string before = options.name_space.empty() ? std::string() : options.name_space + "/";
     frames_ = {before + io::flight_names::world_frame, before + io::flight_names::body_frame,
-               before + io::flight_names::camera_frame};
+               before + io::flight_names::camera_frame, before + "pade_map"};
   }
   /// @{
   /// An empty name changes nothing.

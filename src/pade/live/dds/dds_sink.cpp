@@ -78,6 +78,7 @@ DdsSink::DdsSink(DdsShared& shared, const DdsOptions& options, const DdsSinkPart
     terms.world = frames.world;
     terms.body = frames.body;
     terms.camera = frames.camera;
+    terms.map = frames.map;
     terms.stamp = [this](Time ours) { return shared_.clock.to_stamp(ours); };
     terms.states_body = parts_.states_body;
     terms.states_camera = parts_.states_camera;
@@ -101,8 +102,6 @@ Result<std::unique_ptr<DdsSink>> DdsSink::start(DdsNetwork& network, DdsShared& 
 
 Status DdsSink::open(DdsNetwork& network) {
   for (const PublishedChannel& published : kPublished) {
-    const bool nothing_to_say = !parts_.states_body && !parts_.states_camera;
-    if (published.channel == WebChannel::transforms && nothing_to_say) continue;
     const std::string name =
         published.common ? std::string(published.topic) : own_topic(options_, published.topic);
     const std::string_view type = web_channels[static_cast<std::size_t>(published.channel)].type;
@@ -138,7 +137,7 @@ DdsSink::~DdsSink() {
 void DdsSink::take(const LiveUpdate& update) {
   {
     const std::lock_guard lock(mutex_);
-    newest_ = {update.view, update.time, newest_.version + 1};
+    newest_ = {update.view, update.time, newest_.version + 1, update.origin};
   }
   publisher_.take(update);
 }
@@ -148,7 +147,14 @@ void DdsSink::pass(const LiveFrame& frame) { publisher_.pass(frame); }
 void DdsSink::begin_anew() {
   publisher_.begin_anew();
   const std::lock_guard lock(mutex_);
-  newest_ = {nullptr, now_of_ours(), newest_.version + 1};
+  newest_ = {nullptr, now_of_ours(), newest_.version + 1, newest_.origin};
+}
+
+void DdsSink::forget(const std::shared_ptr<const mapping::MapView>& view, const mapping::MapChange& change) {
+  publisher_.forget(view, change);
+  const std::lock_guard lock(mutex_);
+  newest_.view = view;
+  ++newest_.version;
 }
 
 void DdsSink::take_sectors(const std::array<std::uint16_t, kBins>& distances, Time frame) {
@@ -231,7 +237,9 @@ void DdsSink::publish_map(Time now) {
 }
 
 std::string DdsSink::map_message(MapKind kind, const Newest& map) const {
-  const io::MessageHeader header{shared_.clock.to_stamp(map.time), shared_.names.now().world};
+  const Frames frames = shared_.names.now();
+  const io::MessageHeader header{shared_.clock.to_stamp(map.time),
+                                 map.origin.isZero(0) ? frames.world : frames.map};
   if (!map.view) {  // it has begun anew
     const double any = 1;
     if (kind == MapKind::centres) return io::write_point_cloud(header, {});

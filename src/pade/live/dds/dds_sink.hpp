@@ -61,6 +61,7 @@ class DdsSink : public Sink {
   /// The mapper's thread. None of them waits for a subscriber.
   void take(const LiveUpdate& update) override;
   void pass(const LiveFrame& frame) override;
+  void forget(const std::shared_ptr<const mapping::MapView>& view, const mapping::MapChange& change) override;
   void begin_anew() override;
   void take_sectors(const std::array<std::uint16_t, kBins>& distances, Time frame);
   void take_counts(const SessionCounts& counts);
@@ -88,6 +89,7 @@ class DdsSink : public Sink {
     std::shared_ptr<const mapping::MapView> view;
     Time time;
     std::uint64_t version = 0;
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< LiveUpdate
   };
 
   DdsSink(DdsShared& shared, const DdsOptions& options, const DdsSinkParts& parts, HealthQuestion health);

@@ -52,12 +52,33 @@ std::optional<Time> MessageClock::to_ours(Time stamp) {
     if (std::abs(ours.nanoseconds - at.nanoseconds) > kSecond) return std::nullopt;
     return ours;
   }
-  if (!anchored_ || std::abs(stamp.nanoseconds - ahead_ - at.nanoseconds) > 2 * kSecond) {
-    if (anchored_) ++restarts_;
+  if (anchored_) {
+    const std::int64_t step = stamp.nanoseconds - ahead_ - newest_.nanoseconds;
+    const std::int64_t meanwhile = at.nanoseconds - newest_came_.nanoseconds;
+    if (step < -2 * kSecond || step > meanwhile + 2 * kSecond) {
+      ++restarts_;
+      anchored_ = false;
+    }
+  }
+  if (!anchored_) {
     ahead_ = stamp.nanoseconds - at.nanoseconds + kOnItsWay;
     anchored_ = true;
+    newest_ = {};
   }
-  return Time{stamp.nanoseconds - ahead_};
+  const Time ours{stamp.nanoseconds - ahead_};
+  if (ours > newest_) {
+    newest_ = ours;
+    newest_came_ = at;
+  }
+  return ours;
+}
+
+double MessageClock::behind() const {
+  const std::lock_guard lock(mutex_);
+  if (kind_ == StampClock::system || !anchored_) return 0;
+  constexpr std::int64_t kNone = 100'000'000;  // ns
+  const std::int64_t behind = newest_came_.nanoseconds - newest_.nanoseconds - kOnItsWay;
+  return std::abs(behind) < kNone ? 0 : 1e-9 * static_cast<double>(behind);
 }
 
 Time MessageClock::to_stamp(Time ours) {

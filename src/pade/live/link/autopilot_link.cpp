@@ -186,7 +186,8 @@ std::optional<Time> AutopilotLink::time_of_poses(Time ours) const {
 std::optional<Time> AutopilotLink::newest_pose() const {
   const Time newest = poses_->newest();
   if (newest.nanoseconds == 0) return std::nullopt;
-  return poses_->in_our_time() ? newest : clock_.to_ours(newest);
+  if (!poses_->in_our_time()) return clock_.to_ours(newest);
+  return Time{newest.nanoseconds + static_cast<std::int64_t>(1e9 * poses_->behind())};
 }
 
 std::optional<Time> AutopilotLink::offered_pose_time() const {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pade/core/sensors/pose_jumps.hpp"
 #include "pade/live/link/bracket.hpp"
 #include "pade/live/mavlink/codec.hpp"
 #include "pade/live/mavlink/estimate_messages.hpp"
@@ -19,15 +20,6 @@ using Eigen::Vector3d;
 using mavlink::unpack;
 
 constexpr double kKept = 3;  // s
-
-/// How far a quantity may be off what its rates at both ends say, after so many seconds: beside the error and
-/// its growth what may change unseen between messages that are far apart. Below 0, so that nothing is
-/// explained, where that is too long.
-double explained(double dt, double error, double growth, double acceleration) {
-  constexpr double kTooLong = 2;  // s
-  const double unseen = dt > kFarthestPosesApart ? acceleration * dt * dt / 2 : 0;
-  return dt > kTooLong ? -1 : error + growth * dt + unseen;
-}
 
 Time since_start(std::uint32_t ms) { return {static_cast<std::int64_t>(ms) * 1'000'000}; }
 
@@ -82,7 +74,7 @@ void AutopilotPoses::add_attitude(Time time, const Quaterniond& q_ned_frd, doubl
     constexpr double kUnsaid = 0.15;      // rad
     constexpr double kUnseenTurning = 3;  // rad/s^2
     const double dt = seconds_between(attitudes_.back().time, time);
-    const double most = explained(dt, kUnsaid, std::max(rate_, rate), kUnseenTurning);
+    const double most = explained(dt, {kUnsaid, std::max(rate_, rate), kUnseenTurning});
     const bool known = std::isfinite(rate_) && std::isfinite(rate);
     if (known && dt > 0 && attitudes_.back().value.angularDistance(turn) > most) jump();
   }
@@ -101,7 +93,7 @@ void AutopilotPoses::add_position(Time time, const Vector3d& ned, const Vector3d
     constexpr double kUnseenSpeeding = 3;  // m/s^2
     const double dt = seconds_between(positions_.back().time, time);
     const Vector3d expected = positions_.back().value + dt / 2 * (velocity_ + velocity);
-    const double most = explained(dt, kUnsaid, kUnsaidSpeed, kUnseenSpeeding);
+    const double most = explained(dt, {kUnsaid, kUnsaidSpeed, kUnseenSpeeding});
     if (dt > 0 && expected.allFinite() && (place - expected).norm() > most) jump();
   }
   if (!push(positions_, time, place)) return;

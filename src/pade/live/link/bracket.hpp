@@ -5,13 +5,11 @@
 #include <cstddef>
 #include <string_view>
 
+#include "pade/core/sensors/pose_jumps.hpp"
 #include "pade/core/time.hpp"
 #include "pade/live/link/pose_source.hpp"
 
 namespace pade::live {
-
-/// Nothing is put between samples that are farther apart, s.
-inline constexpr double kFarthestPosesApart = 0.25;
 
 /// Where a time lies among samples.
 struct Bracket {

@@ -57,6 +57,8 @@ class PoseSource {
 
   /// Whether all times are those of our monotonic clock instead.
   [[nodiscard]] virtual bool in_our_time() const { return false; }
+  /// How far the newest of those lie behind it nevertheless: MessageClock::behind().
+  [[nodiscard]] virtual double behind() const { return 0; }
   /// Whose messages are to come.
   virtual void listen_to(const Autopilot& /*autopilot*/) {}
   /// Messages that say nothing of the pose change nothing.

@@ -133,7 +133,7 @@ TlogSummary summarise(std::span<const std::uint8_t> bytes) {
   return summary;
 }
 
-Result<NavigationLog> read_tlog_sensors(const std::filesystem::path& file) {
+Result<NavigationLog> read_tlog_sensors(const std::filesystem::path& file, SensorNeed need) {
   const auto bytes = read_tlog(file);
   if (!bytes) return bytes.error();
   const TlogSummary summary = summarise(*bytes);
@@ -144,7 +144,7 @@ Result<NavigationLog> read_tlog_sensors(const std::filesystem::path& file) {
   }
   SensorGatherer sensors(*summary.autopilot, summary.clock);
   const auto counts = for_each_packet(*bytes, [&](const TlogPacket& packet) { sensors.add(packet.frame); });
-  auto log = sensors.log(file.string());
+  auto log = sensors.log(file.string(), need);
   if (!log) return log.error();
   log->remarks.insert(log->remarks.begin(),
                       fmt::format("{}: {} packets, {} bad, {} gaps in their numbers; stamps are those of {} "

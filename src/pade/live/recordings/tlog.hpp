@@ -59,6 +59,7 @@ TlogSummary summarise(std::span<const std::uint8_t> bytes);
 
 /// The sensors of a recording's autopilot. Errors: those of read_tlog; nobody who flies; a sensor is missing
 /// (SensorGatherer::log).
-Result<NavigationLog> read_tlog_sensors(const std::filesystem::path& file);
+Result<NavigationLog> read_tlog_sensors(const std::filesystem::path& file,
+                                        SensorNeed need = SensorNeed::imu_and_gnss);
 
 }  // namespace pade::live

@@ -15,6 +15,7 @@
 
 #include "pade/core/result.hpp"
 #include "pade/core/sensors/navigation_log.hpp"
+#include "pade/live/autopilot_sensors.hpp"
 
 namespace pade::live {
 
@@ -97,6 +98,7 @@ class Ulog {
 /// IMU (sensor_combined), GNSS (vehicle_gps_position, else sensor_gps), magnetometer (vehicle_magnetometer)
 /// and barometer (vehicle_air_data) in the project's frames. Errors: those of Ulog::parse; the IMU or the
 /// GNSS is missing.
-Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file);
+Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file,
+                                        SensorNeed need = SensorNeed::imu_and_gnss);
 
 }  // namespace pade::live

@@ -127,7 +127,7 @@ std::vector<BarometricHeight> heights_of(const Columns& columns) {
 
 }  // namespace
 
-Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file) {
+Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file, SensorNeed need) {
   auto bytes = io::read_file(file);
   if (!bytes) return bytes.error();
   const auto ulog = Ulog::parse(std::move(*bytes), file.string());
@@ -148,10 +148,12 @@ Result<NavigationLog> read_ulog_sensors(const std::filesystem::path& file) {
     if (!fixes.empty()) log.gnss = io::local_log(fixes, name, log.remarks);
   }
   if (fixes.empty()) {
-    return Error{
-        fmt::format("{}: the GNSS is missing: found no vehicle_gps_position or sensor_gps with a fix in "
-                    "three dimensions{}",
-                    file.string(), damage)};
+    std::string missing = fmt::format(
+        "{}: the GNSS is missing: found no vehicle_gps_position or sensor_gps with a fix in "
+        "three dimensions{}",
+        file.string(), damage);
+    if (need == SensorNeed::imu_and_gnss) return Error{missing};
+    log.remarks.push_back(std::move(missing));
   }
   if (const auto* const topic = ulog->find("vehicle_magnetometer"))
     log.magnetometer = fields_of({*ulog, *topic});

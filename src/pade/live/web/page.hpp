@@ -1,4 +1,4 @@
-// The files of the page, as they are in src/pade/live/web/page.
+// The files of the page, as they are in src/pade/live/web/page, and view_3d.js of src/pade/report/view_3d.
 #pragma once
 
 #include <string_view>
@@ -7,5 +7,6 @@ namespace pade::live {
 
 std::string_view page_html();
 std::string_view page_script();
+std::string_view page_view_3d();
 
 }  // namespace pade::live

@@ -5,8 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::live {
 namespace {
@@ -100,8 +101,7 @@ cv::Mat small_picture(const cv::Mat& picture) {
 }
 
 std::string jpeg_of(const cv::Mat& picture) {
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  const auto bytes = io::encode_jpeg(picture, kJpegQuality);
   return {bytes.begin(), bytes.end()};
 }
 

@@ -91,8 +91,10 @@ void Publisher::take(const LiveUpdate& update) {
     const bool same = mapped.depth.time == update.time;  // else the depth belongs to an older frame
     snapshot->time = mapped.depth.time;
     snapshot->image = same ? update.image : mapped.reference.image.clone();
-    snapshot->depth = mapped.depth.depth.clone();
-    snapshot->variance = mapped.depth.variance.clone();
+    snapshot->depth.window = mapped.depth.window;
+    snapshot->depth.depth = mapped.depth.depth.clone();
+    snapshot->depth.variance = mapped.depth.variance.clone();
+    snapshot->origin = update.origin;
     snapshot->T_world_body = update.T_world_body;
     snapshot->T_world_camera = mapped.reference.T_world_camera;
   }
@@ -101,12 +103,13 @@ void Publisher::take(const LiveUpdate& update) {
     if (snapshot) snapshot->version = frames_ + 1;
     pose_ = {update.time, update.T_world_body};
     ++poses_;
+    origin_ = update.origin;
     path_.add({update.time, update.T_world_body});
     view_ = update.view;
     view_time_ = update.time;
     if (update.mapped != nullptr) add_touched(update.mapped->change, touched_);
     depth_share_ = update.depth_share;
-    count_latency(seconds_between(update.time, now_of_ours()));
+    count_latency(seconds_between(update.time, now_of_ours()) - update.behind);
   }
   publish(snapshot);
 }
@@ -121,6 +124,13 @@ void Publisher::pass(const LiveFrame& frame) {
     snapshot->version = frames_ + 1;
   }
   publish(snapshot);
+}
+
+void Publisher::forget(const std::shared_ptr<const mapping::MapView>& view,
+                       const mapping::MapChange& change) {
+  const std::lock_guard lock(mutex_);
+  view_ = view;
+  add_touched(change, touched_);
 }
 
 void Publisher::begin_anew() {
@@ -168,16 +178,13 @@ std::shared_ptr<const std::string> Publisher::cloud_of(const Snapshot& snapshot)
   const MessageTerms called = terms();
   std::vector<io::DisplayPoint> points;
   if (!snapshot.depth.empty()) {
-    const auto every = std::sqrt(static_cast<double>(snapshot.depth.total()) / kMostPoints);
-    DepthImage image;
-    image.depth = snapshot.depth;
-    image.variance = snapshot.variance;
-    image.window = std::max(1, camera_.width / std::max(1, snapshot.depth.cols));
-    const PointCloud cloud = mapping::back_project(image, camera_, snapshot.T_world_camera, {},
+    const auto every = std::sqrt(static_cast<double>(snapshot.depth.depth.total()) / kMostPoints);
+    const PointCloud cloud = mapping::back_project(snapshot.depth, camera_, snapshot.T_world_camera, {},
                                                    std::max(1, static_cast<int>(std::ceil(every))));
     for (const CloudPoint& point : cloud) points.push_back({point.x, point.y, point.z, point.sigma});
   }
-  return shared(io::write_point_cloud(called.header(snapshot.time, called.world), points));
+  return shared(
+      io::write_point_cloud(called.header(snapshot.time, called.world_of(snapshot.origin)), points));
 }
 
 std::shared_ptr<const std::string> Publisher::of_frame(WebChannel channel, const Snapshot& snapshot) const {
@@ -187,21 +194,31 @@ std::shared_ptr<const std::string> Publisher::of_frame(WebChannel channel, const
     return shared(io::write_compressed_image(header, "jpeg", jpeg_of(picture), kCdr));
   };
   const auto none = [&] { return cv::Mat(snapshot.image.size(), CV_32FC1, cv::Scalar(NAN)); };
+  // On the pixels of the camera, as the messages of an image and its calibration are.
+  const auto whole = [&](const cv::Mat& cells) {
+    if (snapshot.depth.window == 1 || cells.empty()) return cells;
+    cv::Mat pixels(camera_.size(), CV_32FC1);
+    for (int row = 0; row < pixels.rows; ++row)
+      for (int column = 0; column < pixels.cols; ++column)
+        pixels.at<float>(row, column) =
+            cells.at<float>(row / snapshot.depth.window, column / snapshot.depth.window);
+    return pixels;
+  };
+  const cv::Mat depth = whole(snapshot.depth.depth), variance = whole(snapshot.depth.variance);
   switch (channel) {
     case WebChannel::camera:
       return compressed(snapshot.image);
     case WebChannel::camera_info:
       return shared(io::write_camera_info(header, camera_, kCdr));
     case WebChannel::obstacles:
-      return compressed(small_picture(obstacle_picture(snapshot.image, snapshot.depth, snapshot.variance)));
+      return compressed(small_picture(obstacle_picture(snapshot.image, depth, variance)));
     case WebChannel::depth_picture:
-      return compressed(
-          small_picture(depth_picture(snapshot.depth, snapshot.variance, snapshot.image.size())));
+      return compressed(small_picture(depth_picture(depth, variance, snapshot.image.size())));
     case WebChannel::depth:
-      return shared(io::write_image(header, snapshot.depth.empty() ? none() : snapshot.depth, kCdr));
+      return shared(io::write_image(header, depth.empty() ? none() : depth, kCdr));
     case WebChannel::sigma: {
       cv::Mat sigma = none();
-      if (!snapshot.variance.empty()) cv::sqrt(snapshot.variance, sigma);
+      if (!variance.empty()) cv::sqrt(variance, sigma);
       return shared(io::write_image(header, sigma, kCdr));
     }
     case WebChannel::cloud:
@@ -220,6 +237,7 @@ void Publisher::update_voxels() {
     touched.swap(touched_);
     view = view_;
     voxels_time_ = view_time_;
+    voxels_origin_ = origin_;
     anew = std::exchange(begun_anew_, false);
   }
   if (anew) voxels_.begin_anew();
@@ -235,7 +253,7 @@ std::optional<Publisher::Message> Publisher::next_voxels(Cursor& cursor) {
     std::uint64_t known = from;
     const auto markers = voxels_.since(known, kMostVoxels);
     const MessageTerms called = terms();
-    const io::MessageHeader header = called.header(voxels_time_, called.world);
+    const io::MessageHeader header = called.header(voxels_time_, called.world_of(voxels_origin_));
     made_[i] = {voxels_.newest(), {voxels_time_, shared(io::write_cubes(header, markers))}};
     voxels_from_ = from;
     voxels_to_ = known;
@@ -250,12 +268,18 @@ std::optional<Publisher::Message> Publisher::next(WebChannel channel, Cursor& cu
   std::unique_lock lock(mutex_);
   switch (channel) {
     case WebChannel::transforms:
+      if (const MessageTerms called = terms();
+          !called.states_body && !called.states_camera && origin_.isZero(0))
+        return std::nullopt;  // others say all of it
       return made(channel, cursor, poses_, 0, [&]() -> Message {
         const auto& [time, T_world_body] = *pose_;
         const MessageTerms called = terms();
+        const std::string& map = called.world_of(origin_);
         std::vector<io::NamedTransform> transforms;
-        if (called.states_body)
-          transforms.push_back({called.header(time, called.world), called.body, T_world_body});
+        if (called.states_body) transforms.push_back({called.header(time, map), called.body, T_world_body});
+        if (!origin_.isZero(0))
+          transforms.push_back(
+              {called.header(time, called.world), map, {Eigen::Quaterniond::Identity(), origin_}});
         if (called.states_camera)
           transforms.push_back({called.header(time, called.body), called.camera, T_body_camera_});
         return {time, shared(io::write_transforms(transforms, kCdr))};
@@ -266,7 +290,7 @@ std::optional<Publisher::Message> Publisher::next(WebChannel channel, Cursor& cu
         const MessageTerms called = terms();
         std::vector<io::PathPose> poses = path_.poses();
         for (io::PathPose& pose : poses) pose.time = called.header(pose.time, {}).stamp;
-        return {time, shared(io::write_path(called.header(time, called.world), poses))};
+        return {time, shared(io::write_path(called.header(time, called.world_of(origin_)), poses))};
       });
     case WebChannel::sectors:
       return made(channel, cursor, sectors_, 0, [&]() -> Message {

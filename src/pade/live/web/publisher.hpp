@@ -37,10 +37,15 @@ using HealthQuestion = std::function<HealthInputs()>;
 struct MessageTerms {
   std::string world = io::flight_names::world_frame, body = io::flight_names::body_frame,
               camera = io::flight_names::camera_frame;
+  std::string map = "pade_map";       ///< the map's world, where it has an origin of its own (LiveUpdate)
   std::function<Time(Time)> stamp{};  ///< of a time of ours; empty: the same
   bool states_body = true;            ///< the transforms say where the body is in the world
   bool states_camera = true;          ///< and how the camera sits on it
 
+  /// @param origin  of the map in the world of the poses
+  [[nodiscard]] const std::string& world_of(const Eigen::Vector3d& origin) const {
+    return origin.isZero(0) ? world : map;
+  }
   [[nodiscard]] io::MessageHeader header(Time time, const std::string& frame) const {
     return {stamp ? stamp(time) : time, frame};
   }
@@ -68,6 +73,7 @@ class Publisher : public Sink {
   /// The mapper's thread. None of them waits for a client.
   void take(const LiveUpdate& update) override;
   void pass(const LiveFrame& frame) override;
+  void forget(const std::shared_ptr<const mapping::MapView>& view, const mapping::MapChange& change) override;
   void begin_anew() override;
   void take_sectors(const std::array<std::uint16_t, kBins>& distances, Time frame);
   void take_counts(const SessionCounts& counts);
@@ -98,7 +104,9 @@ class Publisher : public Sink {
     Time time;
     std::optional<Pose> T_world_body;  ///< empty: it was not mapped
     Pose T_world_camera;
-    cv::Mat image, depth, variance;  ///< of the depth's frame; depth is empty where there is none
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    cv::Mat image;     ///< of the depth's frame
+    DepthImage depth;  ///< as it was estimated, in cells; empty where there is none
   };
   /// What was made of it last, for all clients that want the same.
   struct Made {
@@ -129,6 +137,7 @@ class Publisher : public Sink {
   std::shared_ptr<const Snapshot> newest_;  // with images
   std::uint64_t frames_ = 0;                // versions of all, with images or without
   std::optional<std::pair<Time, Pose>> pose_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of pose, path and view
   std::uint64_t poses_ = 0;
   std::shared_ptr<const mapping::MapView> view_;
   Time view_time_;
@@ -146,6 +155,7 @@ class Publisher : public Sink {
   // Of the server's thread.
   VoxelLog voxels_;
   Time voxels_time_;  // of the view
+  Eigen::Vector3d voxels_origin_ = Eigen::Vector3d::Zero();
   io::Diagnosis health_;
   Time health_time_;
   std::uint64_t healths_ = 0;

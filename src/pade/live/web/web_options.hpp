@@ -15,7 +15,6 @@ struct WebOptions {
   std::string address = "127.0.0.1";  ///< that it listens at; 0.0.0.0: all of this machine
   std::string token;                  ///< that clients must name; empty: none, which only loopback may have
   std::string origins;                ///< of pages of others that may connect, apart by spaces
-  std::string three = "/usr/share/javascript/three/three.min.js";  ///< file of the page's 3-D view
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& field) {
@@ -25,7 +24,6 @@ struct WebOptions {
           "that clients must name (?token=); empty = none, which only loopback may have");
     field("origins", self.origins,
           "of pages of others that may connect, apart by spaces: https://app.foxglove.dev");
-    field("three", self.three, "three.min.js of the page's 3-D view: Debian's libjs-three has it");
   }
 };
 /// Refuses what makes no sense, or would let the network in without a token.

@@ -15,7 +15,6 @@
 #include <libwebsockets.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 
 #include "pade/live/web/foxglove.hpp"
 #include "pade/live/web/page.hpp"
@@ -248,7 +247,8 @@ int WebServer::Work::refuse(lws* socket, const Refusal& refusal) {
   // It comes from the network, and goes into a page.
   std::string text = refusal.reason;
   std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '<' || c == '>' || c == '&' || c < ' '; }, '?');
+      text.begin(), text.end(), [](char c) { return c == '<' || c == '>' || c == '&' || c < ' ' || c > '~'; },
+      '?');
   (void)lws_return_http_status(socket, static_cast<unsigned>(refusal.code), text.c_str());
   return 1;
 }
@@ -295,7 +295,7 @@ int WebServer::Work::send_body(lws* socket, Connection& connection) {
 }
 
 int WebServer::Work::answer_request(lws* socket, Connection& connection, std::string_view path) {
-  const bool is_script = path == "/page.js" || path == "/three.min.js";  // nothing of the flight is in them
+  const bool is_script = path == "/page.js" || path == "/view_3d.js";  // nothing of the flight is in them
   if (!is_script) {
     if (const Refusal refusal = refusal_of_request(request_of(socket), options_); refusal.code != 0) {
       refused(refusal.reason);
@@ -304,14 +304,9 @@ int WebServer::Work::answer_request(lws* socket, Connection& connection, std::st
   }
   if (path == "/") return answer(socket, connection, 200, "text/html; charset=utf-8", page_html());
   if (path == "/page.js") return answer(socket, connection, 200, "text/javascript", page_script());
+  if (path == "/view_3d.js") return answer(socket, connection, 200, "text/javascript", page_view_3d());
   if (path == "/health.json")
     return answer(socket, connection, 200, "application/json", json_of(publisher_.health()));
-  struct stat file {};
-  if (path == "/three.min.js" && ::stat(options_.three.c_str(), &file) == 0 && S_ISREG(file.st_mode)) {
-    const int served = lws_serve_http_file(socket, options_.three.c_str(), "text/javascript", nullptr, 0);
-    if (served < 0) return -1;
-    return served > 0 && lws_http_transaction_completed(socket) != 0 ? -1 : 0;
-  }
   return answer(socket, connection, 404, "text/plain", "there is no such thing here\n");
 }
 

@@ -4,7 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <type_traits>
+#include <utility>
 
+#include "pade/mapping/query/distance_kernels.hpp"
 #include "pade/mapping/query/tile_tree.hpp"
 #include "pade/mapping/query/voxel_grid.hpp"
 
@@ -14,62 +17,62 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-constexpr int kMostVoxels = 2000;
+/// The bits of the rows along x of a box: those of the voxels that block.
+struct Rows {
+  int row_bytes = 0;
+  int first_bit = 0;  // of each row
+  std::vector<std::uint8_t> bits;
+};
 
-/// The lower envelope of the parabolas f(q) + (x - q)^2 over a row.
-class Row {
+/// Takes them from the tiles.
+class RowsOfBox {
  public:
-  explicit Row(int size) : f_(static_cast<std::size_t>(size)), where_(f_.size()), from_(f_.size() + 1) {}
-  std::int32_t& operator[](int i) { return f_[static_cast<std::size_t>(i)]; }
-  /// @param most  what is as high or higher has no parabola
-  template <class Out>
-  void transform(std::int32_t most, const Out& out) {
-    const int n = static_cast<int>(f_.size());
-    int last = -1;
-    for (int q = 0; q < n; ++q) {
-      if ((*this)[q] >= most) continue;
-      int begin = 0;
-      for (; last >= 0; --last) {
-        begin = first_below(where_[static_cast<std::size_t>(last)], q);
-        if (begin > from_[static_cast<std::size_t>(last)]) break;
-      }
-      if (last < 0) begin = 0;
-      if (begin >= n) continue;
-      ++last;
-      where_[static_cast<std::size_t>(last)] = q;
-      from_[static_cast<std::size_t>(last)] = begin;
-    }
-    int k = 0;
-    for (int x = 0; x < n; ++x) {
-      if (last < 0) {
-        out(x, most);
-        continue;
-      }
-      while (k < last && from_[static_cast<std::size_t>(k) + 1] <= x) ++k;
-      const int q = where_[static_cast<std::size_t>(k)];
-      out(x, std::min(most, (*this)[q] + (x - q) * (x - q)));
-    }
+  RowsOfBox(const VoxelIndex& first, const Eigen::Vector3i& size, int stride) : first_(first), size_(size) {
+    rows_.row_bytes = stride / 8 + 16;
+    rows_.first_bit = first[0] & 7;
+    rows_.bits.assign(static_cast<std::size_t>(rows_.row_bytes) * static_cast<std::size_t>(size.y()) *
+                          static_cast<std::size_t>(size.z()),
+                      0);
+  }
+  Rows read(const TileTree& tiles, bool unknown_blocks) {
+    static const Tile beyond;
+    VoxelIndex last{};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      last[axis] = first_[axis] + size_[static_cast<int>(axis)] - 1;
+    for (int z = first_[2] >> 3; z <= last[2] >> 3; ++z)
+      for (int y = first_[1] >> 3; y <= last[1] >> 3; ++y)
+        for (int x = first_[0] >> 3; x <= last[0] >> 3; ++x) {
+          const Tile& tile = is_addressed({8 * x, 8 * y, 8 * z}) ? tiles.tile(x, y, z) : beyond;
+          if (tile.any_occupied || (unknown_blocks && tile.any_unknown)) add(tile, {x, y, z}, unknown_blocks);
+        }
+    // Of the last tile of each row only what lies in the box counts.
+    const int end = rows_.first_bit + size_.x();
+    if ((end & 7) != 0)
+      for (std::size_t at = static_cast<std::size_t>(end / 8); at < rows_.bits.size();
+           at += static_cast<std::size_t>(rows_.row_bytes))
+        rows_.bits[at] &= static_cast<std::uint8_t>((1 << (end & 7)) - 1);
+    return std::move(rows_);
   }
 
  private:
-  /// The first place from which on the parabola of q is below that of p < q.
-  int first_below(int p, int q) {
-    const std::int32_t above = (*this)[q] + q * q - ((*this)[p] + p * p);  // below 2^25
-    return above < 0 ? 0 : above / (2 * (q - p)) + 1;
+  void add(const Tile& tile, const VoxelIndex& place, bool unknown_blocks) {
+    const int x = place[0] - (first_[0] >> 3);
+    const int y = 8 * place[1] - first_[1];
+    const int z = 8 * place[2] - first_[2];
+    for (int k = std::max(-z, 0); k < std::min(kTileSide, size_.z() - z); ++k) {
+      const Tile::Word& word = tile.words[static_cast<std::size_t>(k)];
+      const std::uint64_t blocked = word.occupied | (unknown_blocks ? ~word.known : 0);
+      if (blocked == 0) continue;
+      const std::size_t row = static_cast<std::size_t>(z + k) * static_cast<std::size_t>(size_.y());
+      for (int j = std::max(-y, 0); j < std::min(kTileSide, size_.y() - y); ++j)
+        rows_.bits[(row + static_cast<std::size_t>(y + j)) * static_cast<std::size_t>(rows_.row_bytes) +
+                   static_cast<std::size_t>(x)] = static_cast<std::uint8_t>(blocked >> (8 * j) & 0xffU);
+    }
   }
-  std::vector<std::int32_t> f_;
-  std::vector<int> where_;
-  std::vector<int> from_;
+  VoxelIndex first_;
+  Eigen::Vector3i size_;
+  Rows rows_;
 };
-
-/// Whether the voxels from `v` to the end of its row in its tile block: bit 0 is `v`.
-std::uint64_t blocked_in_row(const TileTree& tiles, const VoxelIndex& v, bool unknown_blocks) {
-  if (!is_addressed(v)) return unknown_blocks ? 0xffU : 0;
-  const Tile& tile = tiles.tile(v[0] >> 3, v[1] >> 3, v[2] >> 3);
-  const Tile::Word& word = tile.words[static_cast<std::size_t>(v[2] & 7)];
-  const std::uint64_t blocked = word.occupied | (unknown_blocks ? ~word.known : 0);
-  return blocked >> (8 * (v[1] & 7) + (v[0] & 7));
-}
 
 }  // namespace
 
@@ -82,72 +85,38 @@ DistanceField DistanceField::of(const MapView& view, const Eigen::AlignedBox3d& 
   const VoxelIndex last = voxel_beside(box.max(), field.voxel_);
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    field.size_[axis] = std::min(last[i] - first[i] + 1, kMostVoxels);
+    field.size_[axis] = std::min(last[i] - first[i] + 1, kMostDistanceRows);
   }
-  field.first_ = first;
   field.corner_ = corner_of(first, field.voxel_);
-  const double voxels = std::min(most / field.voxel_, 2.0 * kMostVoxels);
-  field.most_ = static_cast<std::int32_t>(std::ceil(voxels * voxels));
-  field.mark(view, unknown);
-  for (int axis = 1; axis < 3; ++axis) field.transform(axis);
+  const double voxels = std::min(most / field.voxel_, 2.0 * kMostDistanceRows);
+  const auto square = static_cast<std::int32_t>(std::ceil(voxels * voxels));
+  field.stride_ = (field.size_.x() + kDistanceLanes - 1) / kDistanceLanes * kDistanceLanes;
+  const Rows rows =
+      RowsOfBox(first, field.size_, field.stride_).read(view.tiles(), unknown == UnknownSpace::blocked);
+  const auto fill = [&](auto& squared, auto* kernel) {
+    using Value = typename std::remove_reference_t<decltype(squared)>::value_type;
+    squared.resize(static_cast<std::size_t>(field.stride_) * static_cast<std::size_t>(field.size_.y()) *
+                   static_cast<std::size_t>(field.size_.z()));
+    std::vector<Value> scratch(
+        static_cast<std::size_t>(distance_scratch(field.size_.maxCoeff(), field.stride_)));
+    const DistanceBox<Value> work{field.size_.x(),  field.size_.y(), field.size_.z(), field.stride_,
+                                  rows.bits.data(), rows.row_bytes,  rows.first_bit,  square,
+                                  squared.data(),   scratch.data()};
+    kernel(work);
+  };
+  if (square <= kMostOf16Bits) {
+    fill(field.near_, PADE_DISPATCH(near_distances, simd::best()));
+  } else {
+    fill(field.far_, PADE_DISPATCH(far_distances, simd::best()));
+  }
   return field;
 }
 
-void DistanceField::mark(const MapView& view, UnknownSpace unknown) {
-  const TileTree& tiles = view.tiles();
-  const bool blocks = unknown == UnknownSpace::blocked;
-  squared_.assign(static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y()) *
-                      static_cast<std::size_t>(size_.z()),
-                  most_);
-  std::int32_t* row = squared_.data();
-  for (int z = 0; z < size_.z(); ++z) {
-    for (int y = 0; y < size_.y(); ++y, row += size_.x()) {
-      for (int x = 0; x < size_.x();) {
-        const VoxelIndex v{first_[0] + x, first_[1] + y, first_[2] + z};
-        const int in_tile = std::min(kTileSide - (v[0] & 7), size_.x() - x);  // of the row
-        const std::uint64_t bits = blocked_in_row(tiles, v, blocks);
-        for (int k = 0; k < in_tile; ++k)
-          if ((bits >> k & 1U) != 0) row[x + k] = 0;
-        x += in_tile;
-      }
-      along_x(row);
-    }
-  }
-}
-
-/// The first pass: the distance along the row alone.
-void DistanceField::along_x(std::int32_t* row) const {
-  const auto pass = [&](int from, int to, int step) {
-    int distance = 2 * kMostVoxels;
-    for (int x = from; x != to; x += step) {
-      distance = row[x] == 0 ? 0 : std::min(distance + 1, 2 * kMostVoxels);
-      row[x] = std::min(row[x], distance * distance);
-    }
-  };
-  pass(0, size_.x(), 1);
-  pass(size_.x() - 1, -1, -1);
-}
-
-void DistanceField::transform(int axis) {
-  const std::array<std::ptrdiff_t, 3> strides{1, size_.x(), std::ptrdiff_t{size_.x()} * size_.y()};
-  const int other = axis == 2 ? 1 : 2;  // beside x
-  const std::ptrdiff_t stride = strides[static_cast<std::size_t>(axis)];
-  Row row(size_[axis]);
-  for (int j = 0; j < size_[other]; ++j) {
-    for (int x = 0; x < size_.x(); ++x) {
-      std::int32_t* start = squared_.data() + x + j * strides[static_cast<std::size_t>(other)];
-      for (int k = 0; k < size_[axis]; ++k) row[k] = start[k * stride];
-      row.transform(most_, [&](int k, std::int32_t value) { start[k * stride] = value; });
-    }
-  }
-}
-
 double DistanceField::at(const Vector3i& v) const {
-  const std::size_t i = static_cast<std::size_t>(v.x()) +
-                        static_cast<std::size_t>(size_.x()) *
-                            (static_cast<std::size_t>(v.y()) +
-                             static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z()));
-  return voxel_ * std::sqrt(static_cast<double>(squared_[i]));
+  const std::size_t row =
+      static_cast<std::size_t>(v.y()) + static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(v.z());
+  const std::size_t i = static_cast<std::size_t>(v.x()) + static_cast<std::size_t>(stride_) * row;
+  return voxel_ * std::sqrt(static_cast<double>(near_.empty() ? far_[i] : near_[i]));
 }
 
 Vector3d DistanceField::centre(const Vector3i& voxel) const {

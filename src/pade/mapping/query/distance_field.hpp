@@ -1,5 +1,6 @@
-// How far it is from each voxel of a box to the nearest one that blocks, exact (Felzenszwalb and
-// Huttenlocher, "Distance transforms of sampled functions", 2012, by integers).
+// How far it is from each voxel of a box to the nearest one that blocks, exact: one pass along each axis, by
+// integers (Saito and Toriwaki, "New algorithms for Euclidean distance transformation", 1994), rows side by
+// side in vector registers.
 #pragma once
 
 #include <cstdint>
@@ -39,16 +40,14 @@ class DistanceField {
     Eigen::Vector3d share;           ///< of the way between them
   };
   [[nodiscard]] bool cell_at(const Eigen::Vector3d& point, Cell& cell) const;
-  void mark(const MapView& view, UnknownSpace unknown);
-  void along_x(std::int32_t* row) const;
-  void transform(int axis);
 
   Eigen::Vector3i size_ = Eigen::Vector3i::Zero();
   Eigen::Vector3d corner_ = Eigen::Vector3d::Zero();  ///< of the box, world, m
-  std::array<int, 3> first_{};                        ///< voxel there
   double voxel_ = 0;
-  std::int32_t most_ = 0;              ///< squared, voxels
-  std::vector<std::int32_t> squared_;  ///< voxels, x fastest
+  int stride_ = 0;  ///< from row to row
+  /// Squared, voxels, x fastest; one of them is used: 16 bits where they hold the farthest.
+  std::vector<std::int16_t> near_;
+  std::vector<std::int32_t> far_;
 };
 
 }  // namespace pade::mapping

@@ -148,10 +148,12 @@ AlignedBox3d MapView::bounds() const {
   return box;
 }
 
-Occupancy MapView::at(const Vector3d& point) const {
+Occupancy TileTree::far_at(const Vector3d& point) const {
   VoxelIndex v;
-  return voxel_at(point, tiles_->per_voxel, v) ? tiles_->at(v) : Occupancy::unknown;
+  return voxel_at(point, per_voxel, v) ? at(v) : Occupancy::unknown;
 }
+
+Occupancy MapView::at(const Vector3d& point) const { return tiles_->state_at(point); }
 
 double MapView::probability(const Vector3d& point) const {
   VoxelIndex v;

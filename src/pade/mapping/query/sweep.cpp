@@ -8,6 +8,7 @@
 
 #include "pade/mapping/query/map_view.hpp"
 #include "pade/mapping/query/moving_ball.hpp"
+#include "pade/mapping/query/sweep_kernels.hpp"
 #include "pade/mapping/query/tile_tree.hpp"
 #include "pade/mapping/query/voxel_grid.hpp"
 
@@ -18,8 +19,8 @@ using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
 constexpr double kPiece = 8;              // of a segment that is searched at a time, voxels
-constexpr double kParallel = 1e-6;        // of a line to the x axis: squared sine
 constexpr double kHalfDiagonal = 0.8661;  // of a cube
+constexpr double kRoundedLength = 0.01;   // voxels: more than lengths are rounded by
 
 /// Bits of the rows y and columns x of a word from first to last, of a tile that begins at `corner`.
 std::uint64_t rectangle(const VoxelIndex& first, const VoxelIndex& last, int x, int y) {
@@ -79,8 +80,10 @@ class Sweep {
   /// The first contact of the ball, length and share counted along this piece alone.
   std::optional<Hit> along(const BallPath& path) {
     best_ = std::numeric_limits<double>::infinity();
-    across_ = 1 - path.direction.x() * path.direction.x();
-    per_across_ = 1 / (across_ * tiles_.voxel);
+    for (int axis = 0; axis < 3; ++axis) ball_.direction[axis] = static_cast<float>(path.direction[axis]);
+    ball_.length = static_cast<float>(path.length);
+    ball_.radius = static_cast<float>(path.radius);
+    ball_.voxel = static_cast<float>(tiles_.voxel);
     for_each_tile(tiles_.voxel, path, [&](const PartOfTile& part) { search(path, part); });
     if (!std::isfinite(best_)) return std::nullopt;
     Hit hit;
@@ -99,43 +102,38 @@ class Sweep {
     const Tile& tile =
         is_addressed(corner) ? tiles_.tile(corner[0] >> 3, corner[1] >> 3, corner[2] >> 3) : beyond;
     if (!tile.any_occupied && !(blocks && tile.any_unknown)) return;
+    const double side = tiles_.voxel;
+    bool is_placed = false;
     in_order(path.direction.z(), part.first, part.last, [&](int z) {
       const Tile::Word& word = tile.words[static_cast<std::size_t>(z)];
       const std::uint64_t bits = part.bits & (word.occupied | (blocks ? ~word.known : 0));
       if (bits == 0) return;
-      in_order(path.direction.y(), 0, kTileSide - 1, [&](int y) {
-        const std::uint64_t row = bits >> (8 * y) & 0xffU;
-        if (row != 0)
-          search_row(path, {corner[0], corner[1] + y, corner[2] + z}, row, word.occupied >> (8 * y));
-      });
+      if (!is_placed) {
+        const Vector3d to = corner_of(corner, side) + Vector3d::Constant(0.5 * side) - path.start;
+        for (int axis = 0; axis < 3; ++axis) ball_.first[axis] = static_cast<float>(to[axis]);
+        is_placed = true;
+      }
+      search_word(path, {corner[0], corner[1], corner[2] + z}, bits, word.occupied);
     });
   }
-  /// Of a row of 8 voxels along x: those between the places where it enters and leaves the cylinder around
-  /// the line of the centre. The squared distance from the line is a parabola in x.
-  void search_row(const BallPath& path, const VoxelIndex& first, std::uint64_t row, std::uint64_t occupied) {
-    const double side = tiles_.voxel;
-    const double reach = path.radius + kHalfDiagonal * side;
-    const Vector3d to = corner_of(first, side) + Vector3d::Constant(0.5 * side) - path.start;
-    const double along = to.dot(path.direction);
-    const double b = to.x() - along * path.direction.x();
-    const double c = to.squaredNorm() - along * along - reach * reach;
-    if (across_ > kParallel) {
-      const double root = b * b - across_ * c;
-      if (root <= 0) return;
-      const double half = std::sqrt(root);
-      const double from = (-b - half) * per_across_;  // voxels
-      const double last = (-b + half) * per_across_;
-      if (last < 0 || from > kTileSide - 1) return;
-      const int low = from > 0 ? static_cast<int>(from) : 0;  // rounded outwards: what is too much is tested
-      row &= (0xffU >> (kTileSide - 1 - std::min(static_cast<int>(last), kTileSide - 1))) & (0xffU << low);
-    } else if (c >= 0) {
-      return;
+  /// @param first  of the word's voxels. @param bits  those that block
+  void search_word(const BallPath& path, const VoxelIndex& first, std::uint64_t bits,
+                   std::uint64_t occupied) {
+    const int z = first[2] & 7;
+    double best = best_;
+    for (bits = near_(ball_, z, bits); bits != 0;) {
+      const int y = path.direction.y() >= 0 ? std::countr_zero(bits) / 8 : 7 - std::countl_zero(bits) / 8;
+      const auto row = static_cast<std::uint8_t>(bits >> (8 * y));
+      const int x = path.direction.x() >= 0 ? std::countr_zero(row) : 7 - std::countl_zero(row);
+      const std::uint64_t bit = std::uint64_t{1} << (8 * y + x);
+      bits &= ~bit;
+      test(path, {first[0] + x, first[1] + y, first[2]},
+           (occupied & bit) != 0 ? Occupancy::occupied : Occupancy::unknown);
+      if (best_ >= best) continue;
+      best = best_;  // what is met later does not count any more
+      ball_.length = static_cast<float>(std::min(path.length, best + kRoundedLength * tiles_.voxel));
+      bits = near_(ball_, z, bits);
     }
-    in_order(path.direction.x(), std::countr_zero(row), 7, [&](int x) {
-      if ((row >> x & 1U) == 0) return;
-      test(path, {first[0] + x, first[1], first[2]},
-           (occupied >> x & 1U) != 0 ? Occupancy::occupied : Occupancy::unknown);
-    });
   }
   void test(const BallPath& path, const VoxelIndex& v, Occupancy state) {
     const AlignedBox3d box = box_of(v, tiles_.voxel);
@@ -158,8 +156,8 @@ class Sweep {
 
   const TileTree& tiles_;
   UnknownSpace unknown_;
-  double across_ = 0;      // squared sine of the angle between the path and the x axis
-  double per_across_ = 0;  // 1 / (across * voxel)
+  decltype(&baseline::voxels_near_ball) near_ = PADE_DISPATCH(voxels_near_ball, simd::best());
+  BallInTile ball_{};
   double best_ = 0;
   VoxelIndex voxel_{};
   Occupancy state_ = Occupancy::unknown;

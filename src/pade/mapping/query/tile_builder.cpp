@@ -29,21 +29,35 @@ void Tile::summarise() {
 }
 
 void TileTree::index() {
-  constexpr std::size_t kMostGroups = 1U << 16U;
+  constexpr std::int64_t kMostGroups = 1U << 16U;
+  constexpr std::int64_t kMostTiles = 1U << 17U;
   constexpr int kTilesOfAGroup = 8;
   groups.clear();
+  near_tiles.clear();
   if (bounds.first[0] > bounds.last[0]) return;
-  std::size_t count = 1;
+  std::int64_t group_count = 1;
+  std::int64_t tile_count = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     first_group[axis] = bounds.first[axis] / kTilesOfAGroup;
     group_counts[axis] = bounds.last[axis] / kTilesOfAGroup - first_group[axis] + 1;
-    count *= static_cast<std::size_t>(group_counts[axis]);
+    group_count *= group_counts[axis];
+    near_counts[axis] = bounds.last[axis] - bounds.first[axis] + 1;
+    tile_count *= near_counts[axis];
   }
-  if (count > kMostGroups) return;
+  if (group_count > kMostGroups) return;
   for (int z = 0; z < group_counts[2]; ++z)
     for (int y = 0; y < group_counts[1]; ++y)
       for (int x = 0; x < group_counts[0]; ++x)
         groups.push_back(&group_by_nodes(first_group[0] + x, first_group[1] + y, first_group[2] + z));
+  // Rounded towards zero, a place below the first tile of all would be in it.
+  const bool is_at_border = *std::min_element(bounds.first.begin(), bounds.first.end()) == 0;
+  if (tile_count > kMostTiles || is_at_border) return;
+  near_first = bounds.first;
+  near_tiles.reserve(static_cast<std::size_t>(tile_count) + 1);
+  near_tiles.push_back(&tile(0, 0, 0));
+  for (int z = bounds.first[2]; z <= bounds.last[2]; ++z)
+    for (int y = bounds.first[1]; y <= bounds.last[1]; ++y)
+      for (int x = bounds.first[0]; x <= bounds.last[0]; ++x) near_tiles.push_back(&tile(x, y, z));
 }
 
 namespace {
@@ -86,14 +100,15 @@ void add_eighth(std::uint64_t rows, std::size_t eighth, std::uint64_t Tile::Word
   }
 }
 
-std::shared_ptr<const Tile> make_tile(const VoxelTile& from, float per_step) {
+std::shared_ptr<const Tile> make_tile(const VoxelStore& voxels, const VoxelTile& from, float per_step) {
   auto tile = std::make_shared<Tile>();
   for (std::size_t eighth = 0; eighth < 8; ++eighth) {
     add_eighth(in_rows(from.known[eighth]), eighth, &Tile::Word::known, *tile);
     add_eighth(in_rows(from.occupied[eighth]), eighth, &Tile::Word::occupied, *tile);
+    const EighthValues values = voxels.values_of(from, eighth);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      tile->log_odds[64 * eighth + i] = quantised(values[i], per_step);
   }
-  for (std::size_t i = 0; i < from.log_odds.size(); ++i)
-    tile->log_odds[i] = quantised(from.log_odds[i], per_step);
   tile->summarise();
   return tile;
 }
@@ -164,7 +179,7 @@ class Builder {
       }
       if constexpr (std::is_same_v<Part, Tile>) {
         extend(place);
-        return make_tile(voxels_.tile(entry), per_step_);
+        return make_tile(voxels_, voxels_.tile(entry), per_step_);
       } else {
         return node_of<Part>(code, old, touched);
       }

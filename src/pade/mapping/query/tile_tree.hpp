@@ -8,7 +8,14 @@
 #include <memory>
 #include <vector>
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include <Eigen/Core>
+
 #include "pade/mapping/occupancy_map.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
 namespace pade::mapping {
 
@@ -62,6 +69,15 @@ struct TileBounds {
   VoxelIndex last{-1, -1, -1};
 };
 
+/// Rounded towards zero; something below -1 or above kVoxelsPerAxis where it is NaN or does not fit.
+inline int truncated(double value) {
+#if defined(__SSE2__)
+  return _mm_cvttsd_si32(_mm_set_sd(value));
+#else
+  return value > -2 && value < kVoxelsPerAxis ? static_cast<int>(value) : -2;
+#endif
+}
+
 /// All tiles of a map. Copies share them.
 struct TileTree {
   std::shared_ptr<const TileWorld> world;
@@ -74,8 +90,12 @@ struct TileTree {
   std::vector<const TileGroup*> groups;
   VoxelIndex first_group{};
   VoxelIndex group_counts{};
+  /// One that is unknown, and the tiles within the bounds, x fastest; empty where they are too many.
+  std::vector<const Tile*> near_tiles;
+  VoxelIndex near_first{};
+  std::array<std::int64_t, 3> near_counts{};
 
-  /// Makes `groups` anew; to be called where `world` or `bounds` has changed.
+  /// Makes `groups` and `near_tiles` anew; to be called where `world` or `bounds` has changed.
   void index();
 
   /// The tile of 8 voxels to a side; tile coordinates from 0 to kTilesPerAxis - 1.
@@ -101,6 +121,27 @@ struct TileTree {
     };
     return *world->children[slot(6, 4)]->children[slot(3, 3)]->children[slot(0, 3)];
   }
+  /// State of the voxel that holds a point (world, m). NaN, or beyond what can be addressed: unknown.
+  [[nodiscard]] Occupancy state_at(const Eigen::Vector3d& point) const {
+    const int x = truncated(per_voxel * point.x() + kTreeCentre);
+    const int y = truncated(per_voxel * point.y() + kTreeCentre);
+    const int z = truncated(per_voxel * point.z() + kTreeCentre);
+    if (near_tiles.empty()) [[unlikely]]
+      return far_at(point);
+    const std::int64_t dx = static_cast<unsigned>((x >> 3) - near_first[0]);
+    const std::int64_t dy = static_cast<unsigned>((y >> 3) - near_first[1]);
+    const std::int64_t dz = static_cast<unsigned>((z >> 3) - near_first[2]);
+    // Without a branch, which points at random would mislead: all ones where the tile is in the index.
+    const std::int64_t is_near =
+        ((dx - near_counts[0]) & (dy - near_counts[1]) & (dz - near_counts[2])) >> 63;
+    const std::int64_t place = ((dz * near_counts[1] + dy) * near_counts[0] + dx + 1) & is_near;
+    const Tile::Word& word =
+        near_tiles[static_cast<std::size_t>(place)]->words[static_cast<unsigned>(z) & 7U];
+    const auto bit = static_cast<unsigned>(8 * y + (x & 7)) & 63U;
+    return static_cast<Occupancy>((word.known >> bit & 1U) + (word.occupied >> bit & 1U));
+  }
+  /// The same without `near_tiles`.
+  [[nodiscard]] Occupancy far_at(const Eigen::Vector3d& point) const;
   /// Beyond what can be addressed: unknown.
   [[nodiscard]] Occupancy at(const VoxelIndex& v) const {
     constexpr auto kAll = static_cast<unsigned>(kVoxelsPerAxis);

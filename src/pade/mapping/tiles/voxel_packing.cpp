@@ -54,23 +54,20 @@ class ValueList {
   std::uint32_t last_ = 0, last_number_ = 0;
 };
 
-EighthKind kind_of(const VoxelTile& tile, std::size_t eighth) {
-  const std::uint64_t known = tile.known[eighth];
+EighthKind kind_of(std::uint64_t known, const EighthValues& values) {
   if (known == 0) return EighthKind::unknown;
   if (~known != 0) return EighthKind::partly;
-  const auto* const first = &tile.log_odds[64 * eighth];
-  return std::all_of(first, first + 64, [first](float value) { return value == *first; })
+  return std::all_of(values.begin(), values.end(), [&](float value) { return value == values[0]; })
              ? EighthKind::uniform
              : EighthKind::known;
 }
 
-/// Calls visit(float) for each log-odds of an eighth that is written, in order.
-template <class Visit>
-void for_values(VoxelTile& tile, std::size_t eighth, EighthKind kind, const Visit& visit) {
-  float* const first = &tile.log_odds[64 * eighth];
-  if (kind == EighthKind::uniform) return visit(*first);
-  for (std::uint64_t rest = tile.known[eighth]; rest != 0; rest &= rest - 1)
-    visit(first[std::countr_zero(rest)]);
+/// Calls visit(value) for each log-odds of an eighth that is written, in order.
+template <class Values, class Visit>
+void for_values(Values& values, std::uint64_t known, EighthKind kind, const Visit& visit) {
+  if (kind == EighthKind::uniform) return visit(values[0]);
+  for (std::uint64_t rest = known; rest != 0; rest &= rest - 1)
+    visit(values[static_cast<std::size_t>(std::countr_zero(rest))]);
 }
 
 }  // namespace
@@ -83,8 +80,9 @@ Bytes VoxelStore::packed(const Node& node) const {
     if (entry.part == Entry::kUniform) list.number_of(entry.value);
     if (!entry.has_parts()) continue;
     for (std::size_t eighth = 0; eighth < 8; ++eighth) {
-      const EighthKind kind = kind_of(tile(entry), eighth);
-      for_values(own_tile(entry), eighth, kind, [&](float value) { list.number_of(value); });
+      const std::uint64_t known = tile(entry).known[eighth];
+      const EighthValues values = values_of(tile(entry), eighth);
+      for_values(values, known, kind_of(known, values), [&](float value) { list.number_of(value); });
     }
   }
   const unsigned width = list.width();
@@ -104,13 +102,14 @@ Bytes VoxelStore::packed(const Node& node) const {
     std::array<EighthKind, 8> kinds{};
     unsigned all = 0;
     for (std::size_t eighth = 0; eighth < 8; ++eighth) {
-      kinds[eighth] = kind_of(tile(entry), eighth);
+      kinds[eighth] = kind_of(tile(entry).known[eighth], values_of(tile(entry), eighth));
       all |= static_cast<unsigned>(kinds[eighth]) << (2 * eighth);
     }
     put_value(bytes, static_cast<std::uint16_t>(all));
     for (std::size_t eighth = 0; eighth < 8; ++eighth) {
       if (kinds[eighth] == EighthKind::partly) put_value(bytes, tile(entry).known[eighth]);
-      for_values(own_tile(entry), eighth, kinds[eighth], put_number);
+      const EighthValues values = values_of(tile(entry), eighth);
+      for_values(values, tile(entry).known[eighth], kinds[eighth], put_number);
     }
   }
   bytes.shrink_to_fit();
@@ -141,9 +140,13 @@ void VoxelStore::unpack_node(const Bytes& bytes, Node& node) const {
       if (kind == EighthKind::unknown) continue;
       made.known[eighth] =
           kind == EighthKind::partly ? take_value<std::uint64_t>(bytes, at) : ~std::uint64_t{0};
-      for_values(made, eighth, kind, [&](float& value) { value = next_value(); });
-      float* const first = &made.log_odds[64 * eighth];
-      if (kind == EighthKind::uniform) std::fill(first, first + 64, *first);
+      if (kind == EighthKind::uniform) {
+        made.same[eighth] = next_value();
+        continue;
+      }
+      for_values(opened_eighth(made, eighth), made.known[eighth], kind,
+                 [&](float& value) { value = next_value(); });
+      close_eighth(made, eighth);
     }
     mark(made);
   }
@@ -153,9 +156,10 @@ void VoxelStore::mark(VoxelTile& tile) const {
   for (std::size_t eighth = 0; eighth < 8; ++eighth) {
     std::uint64_t occupied = 0;
     std::uint64_t least = 0;
+    const EighthValues values = values_of(tile, eighth);
     for (std::uint64_t rest = tile.known[eighth]; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(rest));
-      const float value = tile.log_odds[64 * eighth + bit];
+      const float value = values[bit];
       if (is_occupied(value)) occupied |= std::uint64_t{1} << bit;
       if (value <= rules_.least) least |= std::uint64_t{1} << bit;
     }

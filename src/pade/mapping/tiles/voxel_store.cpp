@@ -7,7 +7,7 @@
 namespace pade::mapping {
 namespace {
 
-constexpr std::size_t kTilesOfABlock = 256;  // of memory
+constexpr std::size_t kTilesOfABlock = 256;  // of memory; and eighths
 
 float log_odds_of(double probability) {
   return static_cast<float>(std::log(probability / (1 - probability)));
@@ -59,8 +59,10 @@ bool VoxelStore::value_at(std::uint64_t code, float& log_odds) const {
     return entry.part == Entry::kUniform;
   }
   const VoxelTile& found = tile(entry);
-  log_odds = found.log_odds[code & 511U];
-  return (found.known[code >> 6U & 7U] >> (code & 63U) & 1U) != 0;
+  const std::size_t eighth = code >> 6U & 7U;
+  const std::uint32_t values = found.values[eighth];
+  log_odds = values == VoxelTile::kNoValues ? found.same[eighth] : own_values(values)[code & 63U];
+  return (found.known[eighth] >> (code & 63U) & 1U) != 0;
 }
 
 std::uint64_t VoxelStore::count_least(std::uint64_t code, unsigned depth) const {
@@ -81,7 +83,8 @@ std::uint64_t VoxelStore::count_least(std::uint64_t code, unsigned depth) const 
 }
 
 std::size_t VoxelStore::memory() const {
-  return tiles_.size() * kTilesOfABlock * sizeof(VoxelTile) + nodes_.size() * sizeof(Node) +
+  return tiles_.size() * kTilesOfABlock * sizeof(VoxelTile) +
+         values_.size() * kTilesOfABlock * sizeof(EighthValues) + nodes_.size() * sizeof(Node) +
          root_.size() * sizeof(Entry) + packed_bytes_;
 }
 
@@ -111,6 +114,7 @@ void VoxelStore::free_parts(Entry& entry, unsigned depth) const {
   if (entry.is_packed()) release_packed(entry);
   if (!entry.has_parts()) return;
   if (depth == kTileDepth) {
+    for (std::size_t eighth = 0; eighth < 8; ++eighth) free_eighth(own_tile(entry), eighth);
     spare_tiles_.push_back(entry.part);
   } else {
     for (Entry& part : *nodes_[entry.part]) free_parts(part, depth + 3);
@@ -123,7 +127,50 @@ void VoxelStore::fill(VoxelTile& tile, float log_odds) const {
   tile.known.fill(kAll);
   tile.occupied.fill(is_occupied(log_odds) ? kAll : 0);
   tile.least.fill(log_odds <= rules_.least ? kAll : 0);
-  tile.log_odds.fill(log_odds);
+  tile.values.fill(VoxelTile::kNoValues);
+  tile.same.fill(log_odds);
+}
+
+EighthValues VoxelStore::values_of(const VoxelTile& tile, std::size_t eighth) const {
+  if (tile.values[eighth] != VoxelTile::kNoValues) return own_values(tile.values[eighth]);
+  EighthValues values{};
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = (tile.known[eighth] >> i & 1U) != 0 ? tile.same[eighth] : 0;
+  return values;
+}
+
+EighthValues& VoxelStore::opened_eighth(VoxelTile& tile, std::size_t eighth) const {
+  if (tile.values[eighth] != VoxelTile::kNoValues) return own_values(tile.values[eighth]);
+  if (spare_values_.empty()) {
+    const auto first = static_cast<std::uint32_t>(values_.size() * kTilesOfABlock);
+    values_.push_back(std::make_unique<EighthValues[]>(kTilesOfABlock));  // NOLINT(*-avoid-c-arrays)
+    for (std::uint32_t i = kTilesOfABlock; i > 0; --i) spare_values_.push_back(first + i - 1);
+  }
+  const std::uint32_t number = spare_values_.back();
+  spare_values_.pop_back();
+  own_values(number) = values_of(tile, eighth);
+  tile.values[eighth] = number;
+  return own_values(number);
+}
+
+void VoxelStore::close_eighth(VoxelTile& tile, std::size_t eighth) const {
+  if (tile.values[eighth] == VoxelTile::kNoValues) return;
+  const EighthValues& values = own_values(tile.values[eighth]);
+  std::uint64_t rest = tile.known[eighth];
+  const float first = rest == 0 ? 0 : values[static_cast<std::size_t>(std::countr_zero(rest))];
+  const auto bits = std::bit_cast<std::uint32_t>(first);  // 0 is not -0
+  for (; rest != 0; rest &= rest - 1) {
+    const float value = values[static_cast<std::size_t>(std::countr_zero(rest))];
+    if (std::bit_cast<std::uint32_t>(value) != bits) return;
+  }
+  free_eighth(tile, eighth);
+  tile.same[eighth] = first;
+}
+
+void VoxelStore::free_eighth(VoxelTile& tile, std::size_t eighth) const {
+  if (tile.values[eighth] == VoxelTile::kNoValues) return;
+  spare_values_.push_back(tile.values[eighth]);
+  tile.values[eighth] = VoxelTile::kNoValues;
 }
 
 VoxelTile& VoxelStore::opened_tile(Entry& entry) {
@@ -176,7 +223,7 @@ float VoxelStore::added(float log_odds, float change) const {
 }
 
 void VoxelStore::miss(VoxelTile& tile, std::size_t eighth, std::uint64_t voxels) const {
-  float* log_odds = &tile.log_odds[64 * eighth];
+  EighthValues& log_odds = opened_eighth(tile, eighth);
   tile.known[eighth] |= voxels;
   for (std::uint64_t rest = voxels; rest != 0; rest &= rest - 1) {
     const auto bit = static_cast<unsigned>(std::countr_zero(rest));
@@ -191,7 +238,7 @@ void VoxelStore::miss(VoxelTile& tile, std::size_t eighth, std::uint64_t voxels)
 void VoxelStore::put(VoxelTile& tile, std::size_t voxel, float log_odds) const {
   const std::size_t eighth = voxel / 64;
   const std::uint64_t mask = std::uint64_t{1} << voxel % 64;
-  tile.log_odds[voxel] = log_odds;
+  opened_eighth(tile, eighth)[voxel % 64] = log_odds;
   tile.known[eighth] |= mask;
   tile.least[eighth] = log_odds <= rules_.least ? tile.least[eighth] | mask : tile.least[eighth] & ~mask;
   tile.occupied[eighth] =
@@ -215,18 +262,17 @@ void VoxelStore::update_tile(Entry& entry, const FreeCube& free, std::span<const
     if (misses != 0) miss(now, eighth, misses);
     for (; !hits.empty() && (hits.front().code >> 6U & 7U) == eighth; hits = hits.subspan(1)) {
       const std::size_t voxel = hits.front().code & 511U;
-      put(now, voxel, added(now.log_odds[voxel], hits.front().change));
+      put(now, voxel, added(opened_eighth(now, eighth)[voxel % 64], hits.front().change));
     }
+    close_eighth(now, eighth);
     const std::uint64_t is_free = now.known[eighth] & ~now.occupied[eighth];
     const std::uint64_t code = tile_code + 64 * eighth;
     append_cells(now.occupied[eighth] & ~was_occupied, code, voxel_, change.became_occupied);
     append_cells(is_free & (~was_known | was_occupied), code, voxel_, change.became_free);
   }
   if (touched) change.touched.push_back(cell_of(tile_code, kTileDepth, voxel_));
-  const float first = now.log_odds[0];
-  if (now.any_unknown() ||
-      std::any_of(now.log_odds.begin(), now.log_odds.end(), [first](float value) { return value != first; }))
-    return;
+  if (!now.is_uniform()) return;
+  const float first = now.same[0];
   free_parts(entry, kTileDepth);
   entry = {Entry::kUniform, first};
 }
@@ -309,8 +355,12 @@ void VoxelStore::forget_free(std::uint64_t tile_code, const std::array<std::uint
       const std::uint64_t gone = voxels[eighth] & now.known[eighth] & ~now.occupied[eighth];
       now.known[eighth] &= ~gone;
       now.least[eighth] &= ~gone;
-      for (std::uint64_t rest = gone; rest != 0; rest &= rest - 1)
-        now.log_odds[64 * eighth + static_cast<std::size_t>(std::countr_zero(rest))] = 0;
+      if (gone != 0 && now.values[eighth] != VoxelTile::kNoValues) {
+        EighthValues& values = own_values(now.values[eighth]);
+        for (std::uint64_t rest = gone; rest != 0; rest &= rest - 1)
+          values[static_cast<std::size_t>(std::countr_zero(rest))] = 0;
+        close_eighth(now, eighth);
+      }
       append_cells(gone, tile_code + 64 * eighth, voxel_, change.became_unknown);
       touched = touched || gone != 0;
       left |= now.known[eighth];
@@ -328,6 +378,7 @@ void VoxelStore::set(std::uint64_t code, unsigned depth, float log_odds) {
     descend(root_[code >> bits_below(kRootDepth)], kRootDepth, code, kTileDepth, [&](Entry& entry) {
       VoxelTile& now = opened_tile(entry);
       for (std::uint64_t at = code; at < code + voxels_of(depth); ++at) put(now, at & 511U, log_odds);
+      close_eighth(now, code >> 6U & 7U);
     });
     return;
   }

@@ -41,14 +41,22 @@ struct VoxelTile {
   std::array<std::uint64_t, 8> known{};
   std::array<std::uint64_t, 8> occupied{};
   std::array<std::uint64_t, 8> least{};  ///< known and as free as can be: a miss changes nothing
-  std::array<float, 512> log_odds{};     ///< of known voxels, else 0
+  static constexpr std::uint32_t kNoValues = 0xffffffff;
+  /// Of an eighth: where its log-odds lie, or that all of its known voxels have the one of `same`.
+  std::array<std::uint32_t, 8> values{kNoValues, kNoValues, kNoValues, kNoValues,
+                                      kNoValues, kNoValues, kNoValues, kNoValues};
+  std::array<float, 8> same{};
 
-  [[nodiscard]] bool any_unknown() const {
-    std::uint64_t all = ~std::uint64_t{0};
-    for (const std::uint64_t word : known) all &= word;
-    return ~all != 0;
+  /// All known, with one log-odds.
+  [[nodiscard]] bool is_uniform() const {
+    for (std::size_t eighth = 0; eighth < 8; ++eighth)
+      if (~known[eighth] != 0 || values[eighth] != kNoValues || same[eighth] != same[0]) return false;
+    return true;
   }
 };
+
+/// Log-odds of an eighth of a tile; of unknown voxels 0.
+using EighthValues = std::array<float, 64>;
 
 /// Side of the cubes that are packed, voxels.
 inline constexpr int kPackedSide = 64;
@@ -79,6 +87,8 @@ class VoxelStore {
   [[nodiscard]] const VoxelTile& tile(const Entry& entry) const {
     return tiles_[entry.part >> 8U][entry.part & 255U];
   }
+  /// Log-odds of an eighth of a tile.
+  [[nodiscard]] EighthValues values_of(const VoxelTile& tile, std::size_t eighth) const;
   /// Log-odds of a voxel; false if it is unknown.
   bool value_at(std::uint64_t code, float& log_odds) const;
   [[nodiscard]] bool is_occupied(float log_odds) const { return log_odds >= rules_.occupied; }
@@ -137,6 +147,14 @@ class VoxelStore {
     return tiles_[entry.part >> 8U][entry.part & 255U];
   }
   VoxelTile& opened_tile(Entry& entry);
+  /// The log-odds of an eighth to write to, and what is to be called when they are written: where all of the
+  /// known ones are the same again they are kept as one.
+  [[nodiscard]] EighthValues& opened_eighth(VoxelTile& tile, std::size_t eighth) const;
+  void close_eighth(VoxelTile& tile, std::size_t eighth) const;
+  void free_eighth(VoxelTile& tile, std::size_t eighth) const;
+  [[nodiscard]] EighthValues& own_values(std::uint32_t number) const {
+    return values_[number >> 8U][number & 255U];
+  }
   Node& opened_node(Entry& entry);
   void join(Entry& entry, unsigned depth, const Entry& part);
   void fill(VoxelTile& tile, float log_odds) const;
@@ -158,8 +176,9 @@ class VoxelStore {
   std::vector<Entry> root_;  // 4096
   // Asking unpacks: what a const function says is the same before and after, where it is kept is not.
   mutable std::vector<std::unique_ptr<Node>> nodes_;
-  mutable std::vector<std::unique_ptr<VoxelTile[]>> tiles_;  // 256 each NOLINT(*-avoid-c-arrays)
-  mutable std::vector<std::uint32_t> spare_nodes_, spare_tiles_;
+  mutable std::vector<std::unique_ptr<VoxelTile[]>> tiles_;      // 256 each NOLINT(*-avoid-c-arrays)
+  mutable std::vector<std::unique_ptr<EighthValues[]>> values_;  // likewise NOLINT(*-avoid-c-arrays)
+  mutable std::vector<std::uint32_t> spare_nodes_, spare_tiles_, spare_values_;
   mutable std::vector<Bytes> packed_;
   mutable std::vector<std::uint32_t> spare_packed_;
   mutable std::size_t packed_bytes_ = 0;
@@ -197,29 +216,29 @@ void VoxelStore::leaves_of(std::span<const Entry> entries, std::uint64_t code, u
 
 template <class Visitor>
 void VoxelStore::leaves_of(const VoxelTile& tile, std::uint64_t code, const Visitor& visitor) const {
-  const auto same = [&](std::size_t from, std::size_t count) {
-    const float first = tile.log_odds[from];
-    bool yes = true;
-    for (std::size_t i = from + 1; yes && i < from + count; ++i) yes = tile.log_odds[i] == first;
-    return yes;
-  };
-  if (!tile.any_unknown() && same(0, 512)) return visitor(code, kTileDepth, tile.log_odds[0]);
+  if (tile.is_uniform()) return visitor(code, kTileDepth, tile.same[0]);
   for (std::size_t eighth = 0; eighth < 8; ++eighth) {
     const std::uint64_t known = tile.known[eighth];
     if (known == 0) continue;
     const std::size_t base = 64 * eighth;
-    if (~known == 0 && same(base, 64)) {
-      visitor(code + base, kTileDepth + 1, tile.log_odds[base]);
+    const EighthValues values = values_of(tile, eighth);
+    const auto same = [&](std::size_t from, std::size_t count) {
+      bool yes = true;
+      for (std::size_t i = from + 1; yes && i < from + count; ++i) yes = values[i] == values[from];
+      return yes;
+    };
+    if (~known == 0 && same(0, 64)) {
+      visitor(code + base, kTileDepth + 1, values[0]);
       continue;
     }
     for (std::size_t i = 0; i < 64; i += 8) {
       const auto eight = static_cast<unsigned>(known >> i & 255U);
-      if (eight == 255 && same(base + i, 8)) {
-        visitor(code + base + i, kTileDepth + 2, tile.log_odds[base + i]);
+      if (eight == 255 && same(i, 8)) {
+        visitor(code + base + i, kTileDepth + 2, values[i]);
         continue;
       }
       for (std::size_t k = 0; k < 8; ++k) {
-        if ((eight >> k & 1U) != 0) visitor(code + base + i + k, kTreeDepth, tile.log_odds[base + i + k]);
+        if ((eight >> k & 1U) != 0) visitor(code + base + i + k, kTreeDepth, values[i + k]);
       }
     }
   }

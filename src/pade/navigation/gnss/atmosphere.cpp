@@ -10,6 +10,12 @@ constexpr double kEquator = 6378137.0;             // WGS84's equator
 constexpr double kFlattening = 1 / 298.257223563;  // WGS84's
 constexpr double kSquaredEccentricity = kFlattening * (2 - kFlattening);
 constexpr double kPi = M_PI;
+constexpr double kAssumedIonosphere = 5;  // in the zenith, m: between a night's 1.5 m and a high sun's 15 m
+
+/// What a delay is longer than in the zenith, by Klobuchar.
+double ionosphere_slant(Direction direction) {
+  return 1 + 16 * std::pow(0.53 - std::max(direction.elevation, 0.0) / kPi, 3);
+}
 
 }  // namespace
 
@@ -73,7 +79,7 @@ double ionosphere_delay(const IonosphereModel& model, const Geodetic& place, Dir
   const double amplitude = std::max(series(model.alpha), 0.0);
   const double period = std::max(series(model.beta), 72000.0);
   const double phase = 2 * kPi * (local - 50400) / period;
-  const double slant = 1 + 16 * std::pow(0.53 - elevation, 3);
+  const double slant = ionosphere_slant(direction);
   double seconds = 5e-9;
   if (std::abs(phase) < 1.57) {
     seconds += amplitude * (1 - phase * phase / 2 + phase * phase * phase * phase / 24);
@@ -81,12 +87,20 @@ double ionosphere_delay(const IonosphereModel& model, const Geodetic& place, Dir
   return kSpeedOfLight * slant * seconds;
 }
 
+double assumed_ionosphere_delay(Direction direction) {
+  return kAssumedIonosphere * ionosphere_slant(direction);
+}
+
 double troposphere_delay(const Geodetic& place, Direction direction) {
-  if (place.height < -100 || place.height > 1e4 || direction.elevation <= 0) return 0;
+  if (direction.elevation <= 0) return 0;
   constexpr double kHumidity = 0.7;
-  const double height = std::max(place.height, 0.0);
-  const double pressure = 1013.25 * std::pow(1 - 2.2557e-5 * height, 5.2568);  // hPa
-  const double temperature = 15 - 6.5e-3 * height + 273.16;                    // K
+  constexpr double kTropopause = 11000;  // m; above it the temperature is the same
+  constexpr double kScaleHeight = 6342;  // of the pressure there, m
+  const double height = std::clamp(place.height, -1000.0, 1e5);
+  const double below = std::min(height, kTropopause);
+  const double pressure =
+      1013.25 * std::pow(1 - 2.2557e-5 * below, 5.2568) * std::exp((below - height) / kScaleHeight);  // hPa
+  const double temperature = 15 - 6.5e-3 * below + 273.16;                                            // K
   const double vapour = 6.108 * kHumidity * std::exp((17.15 * temperature - 4684) / (temperature - 38.45));
   const double gravity = 1 - 0.00266 * std::cos(2 * place.latitude) - 0.00028 * height / 1e3;
   const double zenith = 0.0022768 * pressure / gravity + 0.002277 * (1255 / temperature + 0.05) * vapour;

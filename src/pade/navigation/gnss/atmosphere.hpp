@@ -36,8 +36,13 @@ Direction direction_of(const Eigen::Vector3d& line_of_sight, const Eigen::Matrix
 /// Klobuchar's delay at 1575.42 MHz, m (IS-GPS-200 20.3.3.5.2.5); it goes with 1/f².
 double ionosphere_delay(const IonosphereModel& model, const Geodetic& place, Direction direction, Time time);
 
+/// What is assumed where no model was received: 5 m in the zenith, slanted as Klobuchar's. It may be wrong by
+/// as much.
+double assumed_ionosphere_delay(Direction direction);
+
 /// Saastamoinen's delay in the standard atmosphere, m, humidity 70 %, both parts over the cosine of the
-/// zenith angle. 0 below -100 m and above 10 km, where that atmosphere does not hold, and below the horizon.
+/// zenith angle. Without a step at any height: from 11 km on the air is as cold as there, and below -1 km and
+/// above 100 km the delay is that of these heights. 0 below the horizon.
 double troposphere_delay(const Geodetic& place, Direction direction);
 
 }  // namespace pade::gnss

@@ -77,6 +77,11 @@ std::optional<Estimate> solve_without_outliers(std::span<Equation> equations, do
     }
     estimate = without;
   }
+  if (estimate) {
+    estimate->contradicted = std::any_of(equations.begin(), equations.end(), [&](const Equation& e) {
+      return e.used && std::abs(e.normalised) > gate;
+    });
+  }
   return estimate;
 }
 

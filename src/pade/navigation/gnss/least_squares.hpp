@@ -31,6 +31,8 @@ struct Estimate {
   int used = 0;           ///< equations
   int redundancy = 0;     ///< equations used less unknowns that they name
   double chi_square = 0;  ///< sum of (residual/σ)² of those used; `redundancy` is expected
+  /// Of solve_without_outliers(): equations that are used still contradict each other, and no more can go.
+  bool contradicted = false;
 };
 
 /// Solves the equations that are `used`. Empty if they are too few or (nearly) dependent.

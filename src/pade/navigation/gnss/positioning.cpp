@@ -38,20 +38,40 @@ double range_variance(const SatelliteView& view, bool air_is_corrected, const Po
   const double factor = noise_factor(view, options);
   if (!air_is_corrected) return view.orbit_sigma * view.orbit_sigma * factor * factor;  // of known ranges
   const double noise = options.pseudorange_sigma * factor;
-  const double ionosphere = 0.25 * (view.air - view.air_of_phase);  // half of it is left: the two are ±
+  const double ionosphere = 0.5 * view.air_doubt * (view.air - view.air_of_phase);  // the two are ±
   const double troposphere = 0.1 / std::sin(std::max(view.direction.elevation, 0.05));
   return noise * noise + view.orbit_sigma * view.orbit_sigma + ionosphere * ionosphere +
          troposphere * troposphere;
 }
 
+bool may_be_used(const SatelliteView& view) {
+  return view.use == Use::used || view.use == Use::low || view.use == Use::outlier;
+}
+
+/// The middle of all ranges.
+double middle_range(std::span<const SatelliteView> views) {
+  std::array<double, kMost> ranges{};
+  std::size_t count = 0;
+  for (const SatelliteView& view : views) {
+    if (may_be_used(view) && count < kMost) ranges.at(count++) = view.range;
+  }
+  if (count == 0) return 0;
+  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(ranges.begin(), middle, ranges.begin() + static_cast<std::ptrdiff_t>(count));
+  return *middle;
+}
+
 /// From anywhere to within some 10 m, without air or mask.
 std::optional<Eigen::Vector3d> search(std::span<SatelliteView> views, double gate) {
+  // From the nearest satellite to the farthest are 23000 km. What lies farther apart is no range, and would
+  // spoil the first rounds, which know no outliers.
+  constexpr double kFarthestApart = 3e7;
+  const double middle = middle_range(views);
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   for (int i = 0; i < 12; ++i) {
     System64 system;
     for (SatelliteView& view : views) {
-      if ((view.use != Use::used && view.use != Use::low && view.use != Use::outlier) ||
-          system.size == kMost) {
+      if (!may_be_used(view) || !(std::abs(view.range - middle) < kFarthestApart) || system.size == kMost) {
         continue;
       }
       Equation& e = system.add(view);
@@ -105,6 +125,7 @@ std::optional<Converged> refine(Eigen::Vector3d position, std::span<SatelliteVie
 template <class Fix>
 void take(const Estimate& estimate, Fix& fix) {
   fix.covariance = estimate.covariance.topLeftCorner<3, 3>();
+  if (estimate.contradicted) fix.covariance *= std::max(1.0, estimate.chi_square / estimate.redundancy);
   fix.used = estimate.used;
   fix.redundancy = estimate.redundancy;
   fix.chi_square = estimate.chi_square;
@@ -151,7 +172,8 @@ int pair_phases(std::span<const SatelliteView> before, std::span<SatelliteView> 
     const auto old = std::find_if(before.begin(), before.end(),
                                   [&](const auto& v) { return v.satellite == view.satellite; });
     if (!has_state(view) || old == before.end() || !has_state(*old) || view.signal == nullptr ||
-        !view.signal->carrier || !old->signal->carrier || pairs.size == kMost) {
+        !view.signal->carrier || !old->signal->carrier || view.ephemeris != old->ephemeris ||
+        pairs.size == kMost) {
       continue;
     }
     if (is_flagged(*old->signal, *view.signal)) {
@@ -207,16 +229,19 @@ void look_from(const Eigen::Vector3d& position, std::span<SatelliteView> views,
   const Geodetic place = geodetic_of(position);
   const Eigen::Matrix3d axes = enu_axes(place);
   for (SatelliteView& view : views) {
-    if (view.use != Use::used && view.use != Use::low && view.use != Use::outlier) continue;
+    if (!may_be_used(view)) continue;
     view.direction = direction_of(view.state.position - position, axes);
     view.use = view.direction.elevation < options.elevation_mask ? Use::low : Use::used;
     if (!atmosphere) continue;
     const double troposphere = troposphere_delay(place, view.direction);
     double ionosphere = 0;
-    if (atmosphere->ionosphere && place.height > -1e4 && place.height < 1e5) {
+    view.air_doubt = atmosphere->ionosphere ? 0.5 : 1;
+    if (place.height > -1e4 && place.height < 1e5) {
       const double ratio = view.wavelength * kIonosphereFrequency / kSpeedOfLight;
-      ionosphere =
-          ratio * ratio * ionosphere_delay(*atmosphere->ionosphere, place, view.direction, atmosphere->time);
+      ionosphere = ratio * ratio *
+                   (atmosphere->ionosphere
+                        ? ionosphere_delay(*atmosphere->ionosphere, place, view.direction, atmosphere->time)
+                        : assumed_ionosphere_delay(view.direction));
     }
     view.air = troposphere + ionosphere;
     view.air_of_phase = troposphere - ionosphere;
@@ -300,6 +325,7 @@ std::optional<PhaseStep> step_between(std::span<const SatelliteView> before, std
     if (found->x.head<3>().norm() < 1e-5) break;
   }
   step.clock_step = found->x[3];
+  step.contradicted = found->contradicted;
   take(*found, step);
   return step;
 }

@@ -18,18 +18,20 @@ namespace pade::gnss {
 
 /// How the measurements are weighed and which are refused.
 struct PositioningOptions {
-  bool gps = true;                 ///< use GPS
-  bool glonass = true;             ///< use GLONASS
-  bool galileo = true;             ///< use Galileo
-  bool beidou = true;              ///< use BeiDou
-  double elevation_mask = 0.1745;  ///< lower satellites are not used, rad
-  double lowest_cn0 = 0;           ///< weaker signals are not used, dB-Hz
-  double pseudorange_sigma = 0.6;  ///< in the zenith at 45 dB-Hz, m
-  double doppler_sigma = 0.016;    ///< of the range's rate, likewise, m/s
-  double phase_sigma = 0.0009;     ///< likewise, m
-  double glonass_orbit_sigma = 5;  ///< of its broadcast orbit and clock, which do not say it, m
-  bool weigh_by_cn0 = true;        ///< false: by elevation alone
-  double outlier_gate = 4;         ///< normalised residuals beyond this are outliers
+  bool gps = true;                     ///< use GPS
+  bool glonass = true;                 ///< use GLONASS
+  bool galileo = true;                 ///< use Galileo
+  bool beidou = true;                  ///< use BeiDou
+  double elevation_mask = 0.1745;      ///< lower satellites are not used, rad
+  double lowest_cn0 = 0;               ///< weaker signals are not used, dB-Hz
+  double pseudorange_sigma = 0.6;      ///< in the zenith at 45 dB-Hz, m
+  double doppler_sigma = 0.016;        ///< of the range's rate, likewise, m/s
+  double phase_sigma = 0.0009;         ///< likewise, m
+  double glonass_orbit_sigma = 5;      ///< of its broadcast orbit and clock, which do not say it, m
+  bool estimate_doppler_sigma = true;  ///< over many epochs it grows to what the residuals show
+  bool estimate_phase_sigma = true;    ///< likewise
+  bool weigh_by_cn0 = true;            ///< false: by elevation alone
+  double outlier_gate = 4;             ///< normalised residuals beyond this are outliers
 };
 
 /// visit(options, f) calls f(name, field) for each field.
@@ -46,6 +48,8 @@ void visit(Options& o,
   f("doppler_sigma", o.doppler_sigma);
   f("phase_sigma", o.phase_sigma);
   f("glonass_orbit_sigma", o.glonass_orbit_sigma);
+  f("estimate_doppler_sigma", o.estimate_doppler_sigma);
+  f("estimate_phase_sigma", o.estimate_phase_sigma);
   f("weigh_by_cn0", o.weigh_by_cn0);
   f("outlier_gate", o.outlier_gate);
 }
@@ -60,6 +64,7 @@ const char* to_name(Use use);
 struct SatelliteView {
   SatelliteId satellite;
   const Signal* signal = nullptr;     ///< null for a known range
+  const void* ephemeris = nullptr;    ///< which message the state is of; null for a known range
   SatelliteState state;               ///< when the signal left it
   Direction direction;                ///< from the last position that was computed
   double wavelength = 0;              ///< m
@@ -68,6 +73,7 @@ struct SatelliteView {
   double cn0 = 45;                    ///< dB-Hz; 45 if the receiver does not say
   double air = 0;                     ///< delay of troposphere and ionosphere of the code, m
   double air_of_phase = 0;            ///< the same of the carrier, m
+  double air_doubt = 0.5;             ///< by what share the ionosphere's delay may be wrong
   Use use = Use::used;                ///< for the position
   Use rate_use = Use::not_measured;   ///< for the velocity
   Use phase_use = Use::not_measured;  ///< for the step since the epoch before
@@ -86,7 +92,8 @@ struct PositionFix {
   double chi_square = 0;                                 ///< `redundancy` is expected
 };
 
-/// The antenna's velocity.
+/// The antenna's velocity. Where measurements that are used still contradict each other the covariance is as
+/// many times larger as they do.
 struct VelocityFix {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    ///< ECEF, m/s
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< (m/s)²
@@ -96,7 +103,8 @@ struct VelocityFix {
   double chi_square = 0;                                 ///< `redundancy` is expected
 };
 
-/// How far the antenna came since another epoch, from the change of the carriers' phases.
+/// How far the antenna came since another epoch, from the change of the carriers' phases. The covariance is
+/// enlarged as that of VelocityFix.
 struct PhaseStep {
   Time from;                                             ///< the epoch before
   Eigen::Vector3d step = Eigen::Vector3d::Zero();        ///< ECEF, m
@@ -106,7 +114,13 @@ struct PhaseStep {
   int redundancy = 0;                                    ///< of the equations
   double chi_square = 0;                                 ///< `redundancy` is expected
   int slips = 0;                                         ///< phases refused: flagged, or outliers
+  bool contradicted = false;  ///< those used contradict each other: this is no step to rely on
 };
+
+constexpr double kLongestStep = 2;  ///< between epochs whose phases are compared, s
+
+/// Whether satellites of a system are used.
+bool is_enabled(System system, const PositioningOptions& options);
 
 /// The satellites of an epoch with their states. Those whose state is unknown say why in all three uses.
 /// The views point into `epoch`.
@@ -127,7 +141,7 @@ ViewSigmas sigmas_of(const SatelliteView& view, bool air_is_corrected, const Pos
 /// How the air is corrected.
 struct Atmosphere {
   Time time;
-  std::optional<IonosphereModel> ionosphere;  ///< without it only the troposphere
+  std::optional<IonosphereModel> ionosphere;  ///< without it assumed_ionosphere_delay()
 };
 /// Writes directions and delays as seen from a position, ECEF; satellites below the mask are `low`, others
 /// that have a state `used`. Without `atmosphere` there are no delays (known ranges).
@@ -150,6 +164,8 @@ std::optional<VelocityFix> velocity_at(std::span<SatelliteView> views, const Eig
 /// Least squares on the change of the phases from `before` to `now`, both of which locate() has seen.
 /// A phase is refused if it or its half cycle is flagged, if it contradicts the mean Doppler by more than 2
 /// m/s or 0.5 m (beside what all do alike: the receiver's clock may jump), or if it does not fit the others.
+/// One whose satellite has changed its message in between is not used: no orbit is exact, and their
+/// difference no motion.
 /// @param position  of the epoch before
 /// @param speed     a rough velocity, ECEF, m/s
 std::optional<PhaseStep> step_between(std::span<const SatelliteView> before, std::span<SatelliteView> now,

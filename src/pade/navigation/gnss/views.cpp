@@ -11,20 +11,6 @@ namespace {
 
 constexpr std::array<char, kSystems> kFirstBand{'1', '1', '1', '2'};
 
-bool is_enabled(System system, const PositioningOptions& options) {
-  switch (system) {
-    case System::gps:
-      return options.gps;
-    case System::glonass:
-      return options.glonass;
-    case System::galileo:
-      return options.galileo;
-    case System::beidou:
-      return options.beidou;
-  }
-  return false;
-}
-
 Use use_of(NoState reason) {
   switch (reason) {
     case NoState::no_ephemeris:
@@ -42,6 +28,7 @@ void fill(const Signal& signal, const EphemerisChoice& choice, Time time, const 
           SatelliteView& view) {
   view.state = state_at_transmission(choice, time, *signal.pseudorange);
   const bool glonass = choice.glonass != nullptr;
+  view.ephemeris = glonass ? static_cast<const void*>(choice.glonass) : choice.kepler;
   const int channel = glonass ? choice.glonass->channel : 0;
   view.wavelength = kSpeedOfLight / carrier_frequency(view.satellite.system, signal.code[0], channel);
   // GPS and BeiDou broadcast the middle of a range of accuracies that ends 1.2 times as high.
@@ -56,6 +43,20 @@ void fill(const Signal& signal, const EphemerisChoice& choice, Time time, const 
 }
 
 }  // namespace
+
+bool is_enabled(System system, const PositioningOptions& options) {
+  switch (system) {
+    case System::gps:
+      return options.gps;
+    case System::glonass:
+      return options.glonass;
+    case System::galileo:
+      return options.galileo;
+    case System::beidou:
+      return options.beidou;
+  }
+  return false;
+}
 
 const char* to_name(Use use) {
   switch (use) {

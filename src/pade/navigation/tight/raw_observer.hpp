@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "pade/core/sensors/navigation_log.hpp"
+#include "pade/navigation/gnss/noise_estimate.hpp"
 #include "pade/navigation/gnss/positioning.hpp"
 #include "pade/navigation/tight/raw_epoch.hpp"
 
@@ -35,12 +36,28 @@ class RawObserver {
   std::shared_ptr<const RawEpoch> observe(const gnss::KnownRangeEpoch& epoch);
   /// That of the epochs; empty until there is one.
   [[nodiscard]] const std::optional<LocalFrame>& frame() const { return frame_; }
+  /// What the residuals so far show of the receiver; the sigmas of epochs to come are of it.
+  [[nodiscard]] const gnss::NoiseEstimate& noise() const { return noise_; }
 
  private:
-  void add_fix(std::span<gnss::SatelliteView> views, const gnss::PositionFix& fix, RawEpoch& epoch) const;
-  [[nodiscard]] RawSatellite satellite_of(const gnss::SatelliteView& view, bool air_is_corrected) const;
+  /// An epoch with a position, whose phases those of the next one are held against.
+  struct Seen {
+    std::shared_ptr<const gnss::Epoch> epoch;  ///< what the views point into
+    std::vector<gnss::SatelliteView> views;
+    Vector3d position = Vector3d::Zero();  ///< ECEF, m
+  };
+
+  std::optional<gnss::VelocityFix> add_fix(std::span<gnss::SatelliteView> views, const gnss::PositionFix& fix,
+                                           const gnss::PositioningOptions& weights, RawEpoch& epoch) const;
+  void learn_noise(std::vector<gnss::SatelliteView>& views,
+                   const std::shared_ptr<const gnss::Epoch>& measured, const gnss::PositionFix& fix,
+                   const std::optional<gnss::VelocityFix>& velocity, const gnss::PositioningOptions& weights);
+  [[nodiscard]] RawSatellite satellite_of(const gnss::SatelliteView& view, bool air_is_corrected,
+                                          const gnss::PositioningOptions& weights) const;
   std::shared_ptr<const RawEpoch> observe(std::vector<gnss::SatelliteView> views, Time time,
-                                          const std::optional<gnss::Atmosphere>& air);
+                                          const std::shared_ptr<const gnss::Epoch>& measured,
+                                          const std::optional<gnss::Atmosphere>& air,
+                                          const gnss::PositioningOptions& weights);
 
   const gnss::BroadcastData* broadcast_;
   gnss::PositioningOptions options_;
@@ -48,6 +65,8 @@ class RawObserver {
   Time zero_;
   std::optional<Vector3d> last_;  ///< position that was found, ECEF, m
   std::optional<Vector3d> near_;  ///< ECEF, m; where directions and delays are taken from
+  gnss::NoiseEstimate noise_;
+  std::optional<Seen> before_;
 };
 
 }  // namespace pade::navigation

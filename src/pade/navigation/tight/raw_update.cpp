@@ -26,6 +26,70 @@ bool is_known(const RawState& raw, const RawSatellite& satellite) {
   return system == 0 || raw.system_known.at(system - 1);
 }
 
+/// What tells of the velocity: rates, or phases where the receiver gives no Doppler.
+RawKind judges_of(const RawEquations& equations) {
+  return equations.count(RawKind::rate, false) > 0 ? RawKind::rate : RawKind::phase;
+}
+
+/// The mean velocity since the anchor that the phases show, beside what all have in common, against the
+/// filter's: what a receiver without Doppler has in place of velocity_innovation(). Empty without 5 phases.
+/// @param S    covariance of the variables
+/// @param age  of the anchor, s
+Innovation innovation_of_phases(const RawEquations& equations, const RawMatrix& S, double age) {
+  const bool all = most_refused(equations, RawKind::phase);
+  Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d b = Eigen::Vector4d::Zero();
+  Eigen::Matrix<double, 4, kRawVariables> of_variables = decltype(of_variables)::Zero();
+  int count = 0;
+  for (const RawEquation& e : equations) {
+    if (e.kind != RawKind::phase || !(e.used || all)) continue;
+    Eigen::Vector4d g;
+    g << e.row.segment<3>(kOfPosition), 1;
+    g /= e.variance;
+    N += e.variance * g * g.transpose();
+    b += g * e.residual;
+    of_variables += g * e.row.transpose();
+    ++count;
+  }
+  if (count < 5 || age < 1e-3) return {};
+  const Eigen::LDLT<Eigen::Matrix4d> factor(N);
+  const Eigen::Matrix4d inverse = factor.solve(Eigen::Matrix4d::Identity());
+  const Eigen::Matrix<double, 4, kRawVariables> T = inverse * of_variables;
+  const Eigen::Matrix4d covariance = inverse + T * S * T.transpose();
+  Innovation innovation;
+  innovation.size = 3;
+  innovation.residual = (inverse * b).head<3>() / age;
+  const Matrix3d C = covariance.topLeftCorner<3, 3>() / (age * age);
+  innovation.sigma = C.diagonal().cwiseSqrt();
+  const Eigen::LLT<Matrix3d> root(C);
+  if (root.info() != Eigen::Success || !innovation.residual.allFinite()) return {};
+  innovation.white = root.matrixL().solve(innovation.residual);
+  innovation.chi_square = innovation.white.squaredNorm();
+  return innovation;
+}
+
+/// Whether the rates, or what is in their place, have been refused for so long that the filter is wrong.
+bool motion_is_refused(const RawState& raw, Time now, const FilterOptions& options) {
+  return raw.contradictions >= kLeastContradictions &&
+         seconds_between(raw.rates_agreed, now) >= options.reacquire_after;
+}
+
+/// Whether no range of GPS has been used since the clock was begun by another system: clock and biases are
+/// then known as sums alone, each by itself is as it began.
+template <class Matrix>
+bool is_without_gps(const RawState& raw, const Matrix& P) {
+  const double unknown = kFirstClockSigma * kFirstClockSigma / 6;  // of three systems a quarter is left
+  bool any = false;
+  for (int system = 1; system < static_cast<int>(gnss::kSystems); ++system) {
+    if (!raw.system_known.at(static_cast<std::size_t>(system) - 1)) continue;
+    const int bias = kSystemBias + system - 1;
+    const double together = P(kClock, kClock) * P(bias, bias);
+    if (P(bias, bias) < unknown || P(kClock, bias) > -0.5 * std::sqrt(together)) return false;
+    any = true;
+  }
+  return any && P(kClock, kClock) > unknown;
+}
+
 /// Where the satellite's phase stands among those at the anchor; `anchored` if nowhere.
 std::size_t place_of(const RawState& raw, const RawSatellite& satellite) {
   for (std::size_t i = 0; i < raw.anchored; ++i) {
@@ -94,6 +158,27 @@ void Filter::set_prior(int index, double variance) {
 void Filter::start_receiver(const RawEpoch& epoch) {
   RawState& raw = core_.raw;
   const RawVariables x = raw_variables();
+  if (raw.clock_known && is_without_gps(raw, P_)) {
+    // The clock took the bias of the system that began it for none. If GPS is there now, what the clock is
+    // ahead of its time, and what the others are behind, are both wrong by the same.
+    Median ranges;
+    for (const RawSatellite& s : satellites_of(epoch)) {
+      if (s.range && s.satellite.system == gnss::System::gps)
+        ranges.add(*s.range - predict_range(x, s).value);
+    }
+    if (ranges.count() > 0) {
+      Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1> G = decltype(G)::Zero(size());
+      G[kClock] = G[kAnchorClock] = 1;
+      raw.receiver.clock += ranges.value();
+      raw.receiver.anchor_clock += ranges.value();
+      for (int system = 1; system < static_cast<int>(gnss::kSystems); ++system) {
+        if (!raw.system_known.at(static_cast<std::size_t>(system) - 1)) continue;
+        G[kSystemBias + system - 1] = -1;
+        raw.receiver.system_bias[system - 1] -= ranges.value();
+      }
+      P_.noalias() += kFirstClockSigma * kFirstClockSigma * G * G.transpose();
+    }
+  }
   if (!raw.clock_known) {
     std::array<Median, gnss::kSystems> ranges;
     Median rates;
@@ -267,12 +352,13 @@ bool Filter::ranges_fit(RawEquations& equations) {
 
 bool Filter::rates_fit(const RawEquations& equations) {
   RawState& raw = core_.raw;
-  if (most_refused(equations, RawKind::rate)) {
+  const RawKind judges = judges_of(equations);
+  if (most_refused(equations, judges)) {
     ++raw.contradictions;
     return false;
   }
   raw.contradictions = 0;
-  if (equations.count(RawKind::rate, true) >= kLeastForFix) {
+  if (equations.count(judges, true) >= kLeastForFix) {
     raw.rates_agreed = core_.velocity_accepted = core_.state.time;
     core_.velocity_seen = true;
   }
@@ -285,8 +371,7 @@ void Filter::judge_raw(const RawEpoch& epoch, const Innovation& innovation) {
   const Time now = core_.state.time;
   if (innovation.size > 0) {
     integrity.velocity.add(innovation.white, now, innovation.verdict == Verdict::accepted && !integrity.lost);
-    const bool refused = raw.contradictions >= kLeastContradictions &&
-                         seconds_between(raw.rates_agreed, now) >= options_.reacquire_after;
+    const bool refused = motion_is_refused(raw, now, options_);
     if (refused || integrity.velocity.drift() > options_.drift_bound) {
       open_inertial();
       if (refused) {
@@ -334,6 +419,10 @@ Innovation Filter::update(const RawEpoch& epoch) {
   S.middleRows<3>(kOfBias) = C.middleRows<3>(kPositionBias);
   S.middleRows<kRawStates>(kOfReceiver) = C.middleRows<kRawStates>(kBase);
   RawInformation information = fit(equations, S, options_.raw_gate);
+  if (equations.count(RawKind::rate, false) == 0) {
+    const double age = seconds_between(core_.raw.anchor_time, core_.state.time);
+    innovation = innovation_of_phases(equations, S, age);
+  }
   const bool rates_agree = rates_fit(equations);
   if (!ranges_fit(equations)) information = combined(equations);
   if (rates_agree) {

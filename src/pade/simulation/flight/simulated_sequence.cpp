@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/core/version.hpp"
 #include "pade/io/formats/flow_file.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/options_json.hpp"
 #include "pade/io/text.hpp"
 #include "pade/simulation/flight/frame_maker.hpp"
@@ -115,13 +115,9 @@ std::string ground_truth(const std::vector<CameraStation>& stations) {
 }
 
 Result<std::string> png_bytes(const fs::path& file, const cv::Mat& image) {
-  std::vector<unsigned char> bytes;
   // A fast setting: noise does not compress, whatever the effort.
-  if (!cv::imencode(
-          ".png", image, bytes,
-          {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY, cv::IMWRITE_PNG_STRATEGY_RLE})) {
-    return Error{fmt::format("{}: cannot be encoded", file.string())};
-  }
+  const auto bytes = io::encode_png(image, {.level = 1, .runs_only = true, .left_filter = false});
+  if (bytes.empty()) return Error{fmt::format("{}: cannot be encoded", file.string())};
   return std::string(bytes.begin(), bytes.end());
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -79,6 +80,17 @@ void oscillate(const Oscillation& swing, const Eigen::Vector3d& axis, double tim
   rotation = rotation * step;
   rate =
       step.conjugate() * rate + swing.amplitude * frequency * std::cos(frequency * time + swing.phase) * axis;
+}
+
+/// In which direction a vehicle looks that follows its path. Where it rests, that in which it leaves or
+/// arrives.
+double heading_of_path(const Trajectory& path, double time, const Eigen::Vector4d& velocity) {
+  constexpr double kStill = 1e-12;  // m²/s²
+  constexpr double kMoment = 0.02;  // s
+  if (velocity.head<2>().squaredNorm() > kStill) return std::atan2(velocity[1], velocity[0]);
+  const bool begins = time < 0.5 * path.duration();
+  const Eigen::Vector4d moving = path.derivative(begins ? time + kMoment : time - kMoment, 1);
+  return std::atan2(moving[1], moving[0]);
 }
 
 /// Yaw angles with whole turns added so that no step is longer than half a turn.
@@ -263,7 +275,7 @@ KinematicState Trajectory::at(double time) const {
   double yaw = position[3];
   double yaw_rate = velocity[3];
   if (options_.heading == Heading::path) {
-    yaw = std::atan2(velocity[1], velocity[0]);
+    yaw = heading_of_path(*this, t, velocity);
     const double horizontal = velocity.head<2>().squaredNorm();
     yaw_rate = horizontal > 1e-12
                    ? (velocity[0] * acceleration[1] - velocity[1] * acceleration[0]) / horizontal
@@ -307,11 +319,16 @@ Status Trajectory::check_limits() const {
                     {"tilt", "deg", options_.limits.tilt, degrees},
                     {"angular rate", "deg/s", options_.limits.angular_rate, degrees}};
   constexpr double kStep = 0.01;
+  std::optional<Eigen::Quaterniond> before;
   for (double t = 0; t <= duration(); t += kStep) {
     const KinematicState state = at(t);
+    // Where a vehicle that follows its path turns back on a straight line, its rate says nothing of it.
+    const double turned = before ? before->angularDistance(state.R_world_body) / kStep : 0;
+    before = state.R_world_body;
     const double up = (state.R_world_body * Eigen::Vector3d::UnitZ()).z();
     const double values[] = {state.velocity.norm(), state.acceleration.norm(),
-                             std::acos(std::clamp(up, -1.0, 1.0)), state.angular_velocity.norm()};
+                             std::acos(std::clamp(up, -1.0, 1.0)),
+                             std::max(turned, state.angular_velocity.norm())};
     for (int i = 0; i < 4; ++i) {
       if (values[i] > checks[i].worst) {
         checks[i].worst = values[i];

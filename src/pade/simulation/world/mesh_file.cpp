@@ -11,7 +11,8 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
+
+#include "pade/io/image/image_codec.hpp"
 
 namespace pade::simulation {
 namespace {
@@ -143,16 +144,9 @@ Result<std::shared_ptr<const cv::Mat>> read_texture_image(const std::filesystem:
   if (!std::filesystem::is_regular_file(file, ignored)) {
     return Error{fmt::format("{}: no such texture image", file.string())};
   }
-  cv::Mat image;
-  try {
-    image = cv::imread(file.string(), cv::IMREAD_COLOR);
-  } catch (const cv::Exception&) {  // larger than OpenCV allows
-    return Error{
-        fmt::format("{}: found an image that is too large or broken, expected PNG or JPEG", file.string())};
-  }
-  if (image.empty())
-    return Error{fmt::format("{}: found no image that can be read, expected PNG or JPEG", file.string())};
-  return std::shared_ptr<const cv::Mat>(std::make_shared<cv::Mat>(std::move(image)));
+  auto image = io::load_image(file, io::Pixels::colour);
+  if (!image) return image.error();
+  return std::shared_ptr<const cv::Mat>(std::make_shared<cv::Mat>(std::move(*image)));
 }
 
 Result<std::vector<MeshPart>> read_mesh(const fs::path& file, const SubMesh& part,

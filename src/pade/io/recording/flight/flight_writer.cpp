@@ -8,9 +8,9 @@
 
 #include <GeographicLib/LocalCartesian.hpp>
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "pade/core/version.hpp"
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/navigation/geodetic_fixes.hpp"
 #include "pade/io/navigation/navigation_log.hpp"
 #include "pade/io/recording/messages/message_writer.hpp"
@@ -106,6 +106,27 @@ std::vector<std::string> changed(const Sequence& sequence, const NavigationLog* 
   return notes;
 }
 
+/// What a magnetometer's numbers have to be multiplied by for tesla. Their unit is stated nowhere: the
+/// Earth's field, 22 to 67 millionths of a tesla, tells the usual ones apart. Empty: none of them fits.
+struct MagneticUnit {
+  const char* name;
+  double tesla;
+};
+std::optional<MagneticUnit> unit_of(const std::vector<MagneticField>& samples) {
+  constexpr MagneticUnit kUnits[] = {
+      {"tesla", 1}, {"gauss", 1e-4}, {"microtesla", 1e-6}, {"milligauss", 1e-7}, {"nanotesla", 1e-9}};
+  constexpr double kLeast = 15e-6, kMost = 100e-6;  // T, with what iron nearby adds or takes
+  std::vector<double> sizes;
+  for (const MagneticField& sample : samples)
+    if (sample.field.allFinite()) sizes.push_back(sample.field.norm());
+  if (sizes.empty()) return std::nullopt;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  for (const MagneticUnit& unit : kUnits)
+    if (*middle * unit.tesla >= kLeast && *middle * unit.tesla <= kMost) return unit;
+  return std::nullopt;
+}
+
 /// Writes one flight into one recording.
 class FlightWriter {
  public:
@@ -117,6 +138,23 @@ class FlightWriter {
     if (log != nullptr) log_ = on_clock_of_images(*log, clock_offset(sequence));
     imu_frame_ = T_body_imu_ ? names::imu_frame : names::body_frame;
     written_.notes = changed(sequence, log);
+    if (!log_.gnss.fixes.empty() && !log_.gnss.origin) {
+      written_.notes.emplace_back(
+          "the GNSS positions state no origin on Earth (gnss.csv: # origin=LATITUDE,LONGITUDE,HEIGHT): they "
+          "are written as if their 0 0 0 lay at latitude 0, longitude 0, height 0");
+    }
+    if (log_.magnetometer.empty()) return;
+    constexpr MagneticUnit kGauss{"gauss", 1e-4};
+    const auto unit = unit_of(log_.magnetometer);
+    tesla_ = unit.value_or(kGauss).tesla;
+    if (!unit) {
+      written_.notes.emplace_back(
+          "the unit of the magnetic field is not known, since it is not as strong as the Earth's in tesla, "
+          "gauss, microtesla, milligauss or nanotesla: it is written as if in gauss");
+    } else if (unit->tesla != kGauss.tesla) {
+      written_.notes.push_back(fmt::format(
+          "the magnetic field is as strong as the Earth's in {}: it is taken for that", unit->name));
+    }
   }
 
   Result<WrittenFlight> write(const FlightProgress& progress) {
@@ -235,10 +273,9 @@ class FlightWriter {
             write_velocity({item.time, "gps"}, velocity.velocity, velocity.covariance, encoding_));
       }
       case Item::Kind::field: {
-        constexpr double kTeslaPerGauss = 1e-4;
         return writer_.write(
             names::field, "sensor_msgs/MagneticField", item.time,
-            write_magnetic_field(body, kTeslaPerGauss * log_.magnetometer[item.index].field, encoding_));
+            write_magnetic_field(body, tesla_ * log_.magnetometer[item.index].field, encoding_));
       }
       case Item::Kind::height:
         return writer_.write(
@@ -284,6 +321,7 @@ class FlightWriter {
   NavigationLog log_;
   RecordingWriter& writer_;
   MessageEncoding encoding_;
+  double tesla_ = 1e-4;  // of a unit of the magnetometer
   WrittenFlight written_;
 };
 
@@ -317,6 +355,11 @@ std::string camera_yaml(const Sequence& sequence) {
         fmt::format("intensity_range: [{}, {}]\n", (*calibration.intensity)[0], (*calibration.intensity)[1]);
   if (const auto& up = sequence.world_up(); up && up->stated)
     text += fmt::format("world_up: \"{} {} {}\"\n", up->direction.x(), up->direction.y(), up->direction.z());
+  if (calibration.origin) {
+    const auto& origin = *calibration.origin;
+    text += fmt::format("geographic_origin: [{}, {}, {}]\n", origin.latitude_deg, origin.longitude_deg,
+                        origin.height);
+  }
   if (calibration.gnss_lever_arm) {
     const Eigen::Vector3d& arm = *calibration.gnss_lever_arm;
     text += fmt::format("gnss_lever_arm: [{}, {}, {}]\n", arm.x(), arm.y(), arm.z());
@@ -372,8 +415,8 @@ Status write_mask(const Sequence& sequence, const OutputFolder& folder, WrittenF
     written.left_out.emplace_back("the mask, which is of the undistorted images");
     return {};
   }
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", sequence.mask(), bytes)) return Error{"mask.png: cannot be written as PNG"};
+  const auto bytes = encode_png(sequence.mask());
+  if (bytes.empty()) return Error{"mask.png: cannot be written as PNG"};
   return folder.write("mask.png", std::span<const unsigned char>(bytes));
 }
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/io/recording/messages/pixel_encoding.hpp"
 #include "pade/io/text.hpp"
 
@@ -77,9 +77,9 @@ class RecordedStore : public ImageStore {
     }
     const auto pixels = read(image);
     if (!pixels) return pixels.error();
-    std::vector<unsigned char> bytes;
-    if (!cv::imencode(".png", *pixels, bytes))
-      return named(image.string(), Error{"cannot be written as PNG"});
+    const bool png = (pixels->depth() == CV_8U || pixels->depth() == CV_16U) && !pixels->empty();
+    const auto bytes = png ? encode_png(*pixels) : std::vector<std::uint8_t>();
+    if (bytes.empty()) return named(image.string(), Error{"cannot be written as PNG"});
     return EncodedImage{".png", std::string(bytes.begin(), bytes.end())};
   }
 
