@@ -1,5 +1,5 @@
 # What `cmake --install` and `cpack` put where: the program (component "pade"), the library with its headers (component
-# "libpade-dev") and, where they are built, the module for more image formats (component "pade-image-formats") and the Python
+# "libpade-dev") and, where they are built, the modules for more image formats (component "pade-image-formats") and for videos ("pade-video"), and the Python
 # module (component "python3-pade", whose files python/ installs).
 include(CMakePackageConfigHelpers)
 
@@ -71,12 +71,15 @@ install(FILES ${PROJECT_BINARY_DIR}/padeConfig.cmake ${PROJECT_BINARY_DIR}/padeC
               ${PROJECT_SOURCE_DIR}/cmake/PadeDependencies.cmake ${PROJECT_SOURCE_DIR}/cmake/FindPadeOpenCV.cmake
         DESTINATION ${pade_cmake_folder} COMPONENT libpade-dev)
 
-# The program finds the module by its name, in the folder of libraries beside its own.
+# The program finds its modules by their names, in the folder of libraries beside its own.
 file(RELATIVE_PATH _libraries ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
 set_target_properties(pade_cli PROPERTIES INSTALL_RPATH "$ORIGIN/${_libraries}")
 install(TARGETS pade_cli RUNTIME COMPONENT pade)
 if(TARGET pade_image_formats)
   install(TARGETS pade_image_formats LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT pade-image-formats)
+endif()
+if(TARGET pade_video)
+  install(TARGETS pade_video LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT pade-video)
 endif()
 # Where systemd looks beside the packages' own.
 configure_file(${PROJECT_SOURCE_DIR}/config/systemd/pade-live@.service.in ${PROJECT_BINARY_DIR}/pade-live@.service @ONLY)
@@ -84,6 +87,9 @@ install(FILES ${PROJECT_BINARY_DIR}/pade-live@.service DESTINATION lib/systemd/s
 set(_packages pade libpade-dev)
 if(TARGET pade_image_formats)
   list(APPEND _packages pade-image-formats)
+endif()
+if(TARGET pade_video)
+  list(APPEND _packages pade-video)
 endif()
 foreach(component IN LISTS _packages)
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${component} RENAME copyright
@@ -106,11 +112,15 @@ set(CPACK_DEBIAN_PACKAGE_DEPENDS "")
 set(CPACK_DEBIAN_PADE_PACKAGE_NAME pade)
 set(CPACK_DEBIAN_PADE_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PADE_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PADE_PACKAGE_SUGGESTS pade-image-formats)  # brings OpenCV's imgcodecs with GDAL
+set(CPACK_DEBIAN_PADE_PACKAGE_SUGGESTS "pade-image-formats, pade-video")  # bring OpenCV's imgcodecs with GDAL, and FFmpeg's libraries
 set(CPACK_DEBIAN_PADE-IMAGE-FORMATS_PACKAGE_NAME pade-image-formats)
 set(CPACK_DEBIAN_PADE-IMAGE-FORMATS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PADE-IMAGE-FORMATS_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENT_PADE-IMAGE-FORMATS_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: image formats other than PNG, JPEG, PGM and PPM.")
+set(CPACK_DEBIAN_PADE-VIDEO_PACKAGE_NAME pade-video)
+set(CPACK_DEBIAN_PADE-VIDEO_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PADE-VIDEO_PACKAGE_SHLIBDEPS ON)
+set(CPACK_COMPONENT_PADE-VIDEO_DESCRIPTION "Obstacle maps from one camera and a GPS/INS: video files and network streams.")
 set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_NAME libpade-dev)
 set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_LIBPADE-DEV_PACKAGE_DEPENDS

@@ -15,6 +15,7 @@ namespace pade::cli {
 /// "Rendering  12 of 40  5.1 per second", rewritten in place on standard error at most ten times a second.
 class Progress {
  public:
+  /// `total`: 0 where nobody knows.
   Progress(std::string what, std::size_t total)
       : what_(std::move(what)), total_(total), visible_(isatty(STDERR_FILENO) != 0) {}
   Progress(const Progress&) = delete;
@@ -32,20 +33,22 @@ class Progress {
     if (!visible_) {
       if (now - last_ < std::chrono::seconds(25)) return;
       last_ = now;
-      fmt::print(stderr, "{}  {} of {}  {}\n", what_, done_, total_, note);
+      fmt::print(stderr, "{}  {}{}  {}\n", what_, done_, of_total(), note);
       return;
     }
-    if (done_ < total_ && shown_ && now - last_ < std::chrono::milliseconds(100)) return;
+    if ((done_ < total_ || total_ == 0) && shown_ && now - last_ < std::chrono::milliseconds(100)) return;
     last_ = now;
     shown_ = true;
     const double seconds = std::chrono::duration<double>(now - start_).count();
-    fmt::print(stderr, "\r\033[K{}  {} of {}  {:.1f} per second  {}", what_, done_, total_,
+    fmt::print(stderr, "\r\033[K{}  {}{}  {:.1f} per second  {}", what_, done_, of_total(),
                static_cast<double>(done_) / seconds, note);
     std::fflush(stderr);
   }
 
  private:
   using Clock = std::chrono::steady_clock;
+  [[nodiscard]] std::string of_total() const { return total_ > 0 ? fmt::format(" of {}", total_) : ""; }
+
   std::string what_;
   std::size_t total_;
   std::size_t done_ = 0;

@@ -20,7 +20,8 @@
 #include "pade/offline/map_sequence.hpp"
 
 #include "commands.hpp"
-#include "options/own_folder.hpp"
+#include "convert/convert_video.hpp"
+#include "convert/flight_folder.hpp"
 #include "progress.hpp"
 
 namespace pade::cli {
@@ -32,14 +33,9 @@ struct ConvertArguments {
   std::string in, out;
   std::string poses = "groundtruth", calibration, topics;
   int camera = 0;
+  std::string start;
   bool force = false;
 };
-
-/// What io::write_flight() makes of a flight in a folder.
-constexpr std::string_view kFlightMarker = "camera.yaml";
-constexpr std::string_view kFlightWords = "# written by pade";
-constexpr std::array<std::string_view, 8> kFlightFiles = {
-    "rgb", "groundtruth.txt", kFlightMarker, "mask.png", "imu.csv", "gnss.csv", "mag.csv", "baro.csv"};
 
 /// Refuses to write where the flight itself is: it would be gone before what was made of it is looked at.
 Status check_apart(const ConvertArguments& arguments) {
@@ -112,8 +108,7 @@ Result<io::WrittenFlight> write(const ConvertArguments& arguments, const io::Seq
     return io::write_flight(sequence, log, **writer, step);
   }
   if (arguments.force) {
-    if (Status own = check_own(arguments.out, {kFlightMarker, kFlightWords, kFlightFiles}); !own)
-      return own.error();
+    if (Status own = check_own_flight(arguments.out); !own) return own.error();
   }
   auto folder = io::OutputFolder::create(arguments.out, overwrite, kFlightMarker);
   if (!folder) return folder.error();
@@ -123,8 +118,33 @@ Result<io::WrittenFlight> write(const ConvertArguments& arguments, const io::Seq
   return written;
 }
 
+/// Of a video; options that mean nothing there are refused.
+Status convert_frames(const ConvertArguments& arguments) {
+  const ConvertArguments defaults;
+  const auto refused = [&](std::string_view option, bool given) -> Status {
+    if (!given) return {};
+    return Error{fmt::format("{}: found it for the video {}, which has none, expected a flight", option,
+                             arguments.in)};
+  };
+  if (Status s = refused("--poses", arguments.poses != defaults.poses); !s) return s;
+  if (Status s = refused("--topics", !arguments.topics.empty()); !s) return s;
+  VideoConversion video{arguments.in, arguments.out,  arguments.calibration, arguments.camera,
+                        {},           arguments.force};
+  if (!arguments.start.empty()) {
+    const auto start = parse_time(arguments.start);
+    if (!start)
+      return Error{fmt::format("--start: found \"{}\", expected a time in seconds", arguments.start)};
+    video.start = *start;
+  }
+  return convert_video(video);
+}
+
 Status convert(const ConvertArguments& arguments) {
   if (Status apart = check_apart(arguments); !apart) return apart;
+  if (is_video(arguments.in)) return convert_frames(arguments);
+  if (!arguments.start.empty())
+    return Error{
+        fmt::format("--start: found it for {}, expected a video: a flight has its own times", arguments.in)};
   MapSequenceOptions options;
   options.sequence.poses = arguments.poses;
   options.sequence.calibration = arguments.calibration;
@@ -162,7 +182,9 @@ void add_convert(CLI::App& app, Context& context) {
       "magnetometer and "
       "barometer are\ncarried over; what else there is, is left out and said (docs/formats.md).\n"
       "  pade convert flight flight.bag\n"
-      "  pade convert flight.db3 flight");
+      "  pade convert flight.db3 flight\n"
+      "  pade convert flight.mp4 --calibration camera.yaml flight   (images alone; docs/formats.md, "
+      "\"Videos\")");
   command->add_option("IN", arguments->in, "Folder or recording of a flight")->required();
   command->add_option("OUT", arguments->out, "File or folder, made by this command")->required();
   command->add_option("--poses", arguments->poses, "groundtruth, original, from-imu-gnss or a pose file")
@@ -175,6 +197,7 @@ void add_convert(CLI::App& app, Context& context) {
       ->check(CLI::Range(0, 99));
   command->add_option("--topics", arguments->topics,
                       "Topics of a recording that are meant where several fit, separated by blanks");
+  command->add_option("--start", arguments->start, "Of a video: time of its first frame, s (default 0)");
   command->add_flag("--force", arguments->force, "Replace a file, or a folder that this command wrote");
   command->callback([arguments, &context] {
     io::watch_for_interrupts();

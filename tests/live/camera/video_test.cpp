@@ -19,6 +19,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "pade/io/image/image_codec.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/camera/video_clock.hpp"
 #include "pade/live/camera/video_source.hpp"
@@ -172,6 +173,39 @@ TEST_F(VideoTest, DamagedFilesEnd) {
       last = time;
     }
   }
+}
+
+TEST_F(VideoTest, BecomesAFolderOfImages) {
+  const fs::path file = video("flight.avi", 12, "-c:v mjpeg -q:v 2");
+  std::ofstream(folder_ / "lens.yaml")
+      << "width: 160\nheight: 96\nfx: 100\nfy: 100\ncx: 79.5\ncy: 47.5\ndistortion_model: none\n";
+  const auto convert = [&](const std::string& options) {
+    return runs(fmt::format("{} convert '{}' '{}' {} > '{}' 2>&1", PADE_PROGRAM, file.string(),
+                            (folder_ / "out").string(), options, (folder_ / "said").string()));
+  };
+  const auto said = [&] {
+    std::ifstream in(folder_ / "said");
+    return std::string((std::istreambuf_iterator<char>(in)), {});
+  };
+  const std::string lens = fmt::format("--calibration '{}'", (folder_ / "lens.yaml").string());
+  EXPECT_FALSE(convert(""));
+  EXPECT_THAT(said(), HasSubstr("expected --calibration FILE"));
+  EXPECT_FALSE(convert(lens + " --poses original"));
+  EXPECT_THAT(said(), HasSubstr("--poses"));
+  EXPECT_FALSE(convert(lens + " --start noon"));
+  EXPECT_THAT(said(), HasSubstr("found \"noon\""));
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  ASSERT_TRUE(convert(lens + " --start 100.5")) << said();
+  EXPECT_THAT(said(), HasSubstr("12 images of 0.44 s"));
+  for (int i = 0; i < 12; ++i) {
+    const fs::path image = folder_ / "out" / "rgb" / fmt::format("{:.6f}.png", 100.5 + i / kRate);
+    const auto read = io::load_image(image, io::Pixels::grey);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(number_of(*read), i);
+  }
+  EXPECT_FALSE(convert(lens));
+  EXPECT_TRUE(convert(lens + " --force")) << said();
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "rgb" / "0.000000.png"));
 }
 
 /// Sends a file in real time to whoever connects, once.

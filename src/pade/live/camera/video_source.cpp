@@ -27,8 +27,9 @@ Result<const VideoModule*> load_video_module() {
   if (library == nullptr) {
     const char* const reason = ::dlerror();
     return Error{
-        fmt::format("PADE's module for videos cannot be loaded ({}), expected it beside the program; "
-                    "it is built where libavformat-dev, libavcodec-dev and libswscale-dev are",
+        fmt::format("PADE's module for videos cannot be loaded ({}), expected the package pade-video, or "
+                    "libavformat-dev, "
+                    "libavcodec-dev and libswscale-dev where PADE is built",
                     reason == nullptr ? kVideoModule : reason)};
   }
   const auto function = reinterpret_cast<VideoModuleFunction>(::dlsym(library, video_module_symbol));
@@ -39,11 +40,6 @@ Result<const VideoModule*> load_video_module() {
     return Error{fmt::format("found {} of version {} with OpenCV {}, expected {} with OpenCV {}",
                              kVideoModule, found->pade, found->opencv, ours.pade, ours.opencv)};
   return found;
-}
-
-const Result<const VideoModule*>& video_module() {
-  static const Result<const VideoModule*> kLoaded = load_video_module();
-  return kLoaded;
 }
 
 Status check_size(const std::string& name, const cv::Mat& image, const Camera& camera) {
@@ -219,6 +215,11 @@ Result<std::unique_ptr<FrameSource>> open_video_file(const VideoModule& library,
 }
 
 }  // namespace
+
+const Result<const VideoModule*>& video_module() {
+  static const Result<const VideoModule*> kLoaded = load_video_module();
+  return kLoaded;
+}
 
 bool is_stream(const std::string& name) { return name.find("://") != std::string::npos; }
 

@@ -10,6 +10,11 @@
 
 namespace pade::live {
 
+struct VideoModule;
+
+/// The module for videos (video_module.hpp), loaded when it is first asked for, or why there is none.
+const Result<const VideoModule*>& video_module();
+
 /// Whether it names a stream rather than a file: rtsp://192.168.0.10/main.
 bool is_stream(const std::string& name);
 
