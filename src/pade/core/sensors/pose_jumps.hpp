@@ -33,9 +33,10 @@ inline double explained(double dt, const MotionSlack& slack) {
 
 /// A pose that does not follow from those before.
 struct PoseJump {
+  /// What of it does not follow: where it is, where it looks, or that it comes after too long a time.
   enum class Kind : std::uint8_t { place, turn, gap };
-  Kind kind = Kind::place;
-  double size = 0;  ///< off where the motion leads to: m, rad; of a gap its length, s
+  Kind kind = Kind::place;  ///< which of these
+  double size = 0;          ///< off where the motion leads to: m, rad; of a gap its length, s
 };
 
 /// What the next pose is off where the poses before lead to, with the velocity and rate of their last 0.05 to
@@ -44,6 +45,8 @@ struct PoseJump {
 /// kFarthestPosesApart what 3 m/s², 3 rad/s² and an error of 0.5 m/s, 0.15 rad/s add to that; nothing over
 /// more than kLongestPoseGap. Where the poses before are too few for a velocity, 30 m/s and 10 rad/s.
 /// @param samples  each with `time` and `pose` (T_world_x, z of the world up), in their order
+/// @param time     of the next pose, not before that of the last sample
+/// @param next     that pose, T_world_x
 /// @return empty: it follows
 template <class Samples>
 std::optional<PoseJump> jump_to(const Samples& samples, Time time, const Pose& next) {

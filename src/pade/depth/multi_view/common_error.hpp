@@ -41,7 +41,9 @@ class CommonError {
   [[nodiscard]] float largest_parallax2() const { return largest_parallax2_; }
   /// What a row of cells holds, for each of its pixels: for each view, the longest baseline first, |a|^2 and
   /// the three coefficients of the variance, each `width` numbers.
-  /// @param row  of the cells. @param width  of the image, px
+  /// @param row    of the cells
+  /// @param width  of the image, px
+  /// @param out    those numbers, resized as they need it
   void expand(int row, int width, std::vector<float>& out) const;
 
  private:
