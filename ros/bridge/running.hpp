@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <opencv2/core.hpp>
+#include <pade/mapping/query/map_view.hpp>
 #include <pade/pade.hpp>
 
 #include "bridge.hpp"
