@@ -1,11 +1,13 @@
 #include "sensor_poses.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <deque>
 #include <mutex>
 #include <optional>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -50,12 +52,7 @@ class SensorPoses : public PoseInput {
     }
     newest_imu_ = time;
     imu_frame_ = frame_name(message.frame.empty() ? options_.base_frame : message.frame);
-    const pade::ImuSample sample{time, vector(message.angular_rate), vector(message.specific_force)};
-    if (!origin_) {
-      held_imu_.push_back(sample);
-      while (seconds_between(held_imu_.front().time, time) > 2 * kPatience) held_imu_.pop_front();
-    }
-    navigator_.add(sample);
+    give(pade::ImuSample{time, vector(message.angular_rate), vector(message.specific_force)});
     if (const std::uint64_t restarts = navigator_.health().restarts; restarts != restarts_) {
       restarts_ = restarts;
       ++jumps_;
@@ -73,9 +70,8 @@ class SensorPoses : public PoseInput {
       return;
     }
     if (origin_) return take(message);
-    held_fixes_.push_back(message);
-    while (seconds_between({held_fixes_.front().stamp}, {message.stamp}) > 2 * kPatience)
-      held_fixes_.pop_front();
+    hold({message.stamp}, message);
+    ++held_fixes_;
     if (knows_lever_arm(message)) take_held();
   }
 
@@ -92,7 +88,7 @@ class SensorPoses : public PoseInput {
       variance.z() = pade::io::open_vertical_velocity * pade::io::open_vertical_velocity;
     }
     velocity.covariance = variance.asDiagonal();
-    navigator_.add(velocity);
+    give(velocity);
     ++velocities_;
   }
 
@@ -112,7 +108,7 @@ class SensorPoses : public PoseInput {
         field_remark_ =
             fmt::format("taken as if the axes of {} were those of {}: {}", frame, imu_frame_, why);
     }
-    navigator_.add(pade::MagneticField{{message.stamp}, field, kSigma});
+    give(pade::MagneticField{{message.stamp}, field, kSigma});
     ++fields_;
   }
 
@@ -120,7 +116,7 @@ class SensorPoses : public PoseInput {
     const std::lock_guard lock(mutex_);
     constexpr double kSigma = 0.3;  // m
     if (!(message.pascal > 1e4 && message.pascal < 1.2e5)) return;
-    navigator_.add(
+    give(
         pade::BarometricHeight{{message.stamp}, pade::io::height_of_pressure(0.01 * message.pascal), kSigma});
     ++heights_;
   }
@@ -137,6 +133,10 @@ class SensorPoses : public PoseInput {
     };
     if (imu_frame_.empty()) {
       reply.why = "no message of the IMU has come";
+      return reply;
+    }
+    if (!origin_ && held_fixes_ > 0) {
+      reply.why = waits_for_;
       return reply;
     }
     const auto pose = navigator_.absolute_pose(time);
@@ -197,7 +197,7 @@ class SensorPoses : public PoseInput {
       missing(fmt::format("{} comes at {:.0f} Hz, expected 20 Hz and more", topics_.imu, rate));
     } else if (fix_rate_.count() == 0) {
       missing(fmt::format("no sensor_msgs/NavSatFix on {}", topics_.fix));
-    } else if (!origin_ && held_fixes_.empty()) {
+    } else if (!origin_ && held_fixes_ == 0) {
       missing(fmt::format("{} has no fix", topics_.fix));
     } else if (!origin_) {
       missing(waits_for_);
@@ -244,8 +244,8 @@ class SensorPoses : public PoseInput {
   void begin_anew(std::string why) {
     navigator_ = Navigator(navigator_options_);
     origin_.reset();
-    held_imu_.clear();
-    held_fixes_.clear();
+    held_.clear();
+    held_fixes_ = 0;
     antenna_remark_.clear();
     asked_since_.reset();
     newest_imu_ = {};
@@ -253,6 +253,9 @@ class SensorPoses : public PoseInput {
     ++jumps_;
     last_jump_ = std::move(why);
   }
+
+  using Held = std::variant<pade::ImuSample, FixMessage, pade::GnssVelocity, pade::MagneticField,
+                            pade::BarometricHeight>;
 
   /// Whether it is known where the antenna sits, or will not be: nothing is measured before, since what was
   /// measured with another place of it cannot be taken back.
@@ -269,7 +272,6 @@ class SensorPoses : public PoseInput {
       Placement placement;
       if (transforms_.find(imu_frame_, frame, message.stamp, placement, why) == Transforms::Answer::valid) {
         const Eigen::Vector3d arm = vector(placement.position);
-        placed_anew_ = arm != navigator_options_.gnss_lever_arm;
         navigator_options_.gnss_lever_arm = arm;
         return true;
       }
@@ -283,22 +285,49 @@ class SensorPoses : public PoseInput {
     return true;
   }
 
-  /// What came meanwhile, in its order.
+  /// Until there is an origin, what is measured is kept: a filter that began without one would be moved.
+  template <class Measurement>
+  void give(const Measurement& measurement) {
+    if (origin_)
+      navigator_.add(measurement);
+    else
+      hold(measurement.time, measurement);
+  }
+
+  void hold(Time time, const Held& measurement) {
+    held_.emplace_back(time, measurement);
+    while (seconds_between(held_.front().first, time) > 2 * kPatience) {
+      if (std::holds_alternative<FixMessage>(held_.front().second)) --held_fixes_;
+      held_.pop_front();
+    }
+  }
+
+  /// What came meanwhile, in the order of its times: topics come in any.
   void take_held() {
     waits_for_.clear();
     asked_since_.reset();
-    const auto fixes = std::exchange(held_fixes_, {});
-    const auto samples = std::exchange(held_imu_, {});
-    if (fixes.size() == 1 && !placed_anew_) return take(fixes.front());
-    placed_anew_ = false;
+    auto held = std::exchange(held_, {});
+    held_fixes_ = 0;
+    const auto rank = [](const auto& entry) {
+      return std::pair(entry.first, !std::holds_alternative<pade::ImuSample>(entry.second));
+    };
+    std::stable_sort(held.begin(), held.end(),
+                     [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
     navigator_ = Navigator(navigator_options_);
     restarts_ = 0;
-    auto fix = fixes.begin();
-    for (const pade::ImuSample& sample : samples) {
-      for (; fix != fixes.end() && fix->stamp < sample.time.nanoseconds; ++fix) take(*fix);
-      navigator_.add(sample);
+    for (const auto& [time, measurement] : held) {
+      if (const auto* const fix = std::get_if<FixMessage>(&measurement)) {
+        take(*fix);
+      } else if (const auto* const imu = std::get_if<pade::ImuSample>(&measurement)) {
+        navigator_.add(*imu);
+      } else if (const auto* const velocity = std::get_if<pade::GnssVelocity>(&measurement)) {
+        navigator_.add(*velocity);
+      } else if (const auto* const field = std::get_if<pade::MagneticField>(&measurement)) {
+        navigator_.add(*field);
+      } else if (const auto* const height = std::get_if<pade::BarometricHeight>(&measurement)) {
+        navigator_.add(*height);
+      }
     }
-    for (; fix != fixes.end(); ++fix) take(*fix);
   }
 
   void take(const FixMessage& message) {
@@ -344,10 +373,9 @@ class SensorPoses : public PoseInput {
   Navigator navigator_;
   Pose T_body_camera_;
   std::string imu_frame_, last_jump_, field_remark_, body_remark_, antenna_remark_, waits_for_;
-  std::deque<pade::ImuSample> held_imu_;  // until there is an origin
-  std::deque<FixMessage> held_fixes_;
-  std::optional<Time> asked_since_;  // where the antenna sits
-  bool placed_anew_ = false;         // it sits elsewhere than the navigator believes
+  std::deque<std::pair<Time, Held>> held_;  // until there is an origin
+  std::size_t held_fixes_ = 0;              // of these
+  std::optional<Time> asked_since_;         // where the antenna sits
   std::optional<pade::io::GeodeticFix> origin_;
   Time newest_imu_{};
   Rate imu_rate_, fix_rate_;

@@ -103,7 +103,7 @@ Status convert_video(const VideoConversion& conversion) {
         fmt::format("{}: found an ending, expected a folder: a video has no poses, which a recording "
                     "of a flight needs",
                     conversion.out)};
-  const auto library = live::video_module();
+  const auto& library = live::video_module();
   if (!library) return Error{fmt::format("{}: {}", conversion.in, library.error().message)};
   if (conversion.force) {
     if (Status own = check_own_flight(conversion.out); !own) return own;
