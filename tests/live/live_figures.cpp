@@ -144,7 +144,7 @@ int ride(const io::Sequence& sequence, const Ride& plan) {
   const auto arrived = camera.arrived();
   const auto poses = autopilot.poses();
   std::vector<double> from_ready, from_exposure, ages;
-  Time last;
+  Time first, last;
   for (const auto& heard : autopilot.sectors()) {
     const auto frame = static_cast<std::int64_t>(heard.sectors.time_usec);
     const auto image = arrived.find(frame);
@@ -156,10 +156,11 @@ int ride(const io::Sequence& sequence, const Ride& plan) {
     from_ready.push_back(seconds_between(ready, heard.time));
     from_exposure.push_back(seconds_between({frame * 1000}, heard.time));
     ages.push_back(from_exposure.back());
+    if (from_ready.size() == 1) first = heard.time;
     last = heard.time;
   }
   const SessionCounts& counts = session->counts();
-  const double flown = seconds_between(start, last) - 5;
+  const double flown = seconds_between(first, last);
   fmt::print("{} views, camera {:.0f} Hz, {:.0f} s: {} frames = {} mapped + {} skipped + {} dropped ({})\n",
              plan.views, plan.rate, plan.seconds, counts.frames, counts.mapped, counts.skipped,
              counts.dropped,
