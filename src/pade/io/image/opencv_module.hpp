@@ -28,6 +28,5 @@ struct OtherFormats {
 
 /// The module's one symbol.
 inline constexpr const char* other_formats_symbol = "pade_other_image_formats";
-using OtherFormatsFunction = const OtherFormats* (*)();
 
 }  // namespace pade::io

@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include "pade/io/image/opencv_module.hpp"
+#include "pade/io/loaded_module.hpp"
 
 namespace pade::io {
 namespace {
@@ -47,31 +47,10 @@ constexpr std::array kSignatures = {
     Signature{140, "DTED"sv, "DTED"},
 };
 
-constexpr const char* kModule = "libpade_image_formats.so";
-
-/// The module, or why there is none. It stays until the process ends: what it brings cannot be unloaded.
-Result<const OtherFormats*> load_module() {
-  void* const module = ::dlopen(kModule, RTLD_NOW | RTLD_LOCAL);
-  if (module == nullptr) {
-    const char* const reason = ::dlerror();
-    return Error{
-        fmt::format("PADE's module for it cannot be loaded ({}), expected the package pade-image-formats, or "
-                    "libopencv-imgcodecs-dev where PADE is built",
-                    reason == nullptr ? kModule : reason)};
-  }
-  const auto function = reinterpret_cast<OtherFormatsFunction>(::dlsym(module, other_formats_symbol));
-  const OtherFormats* const formats = function == nullptr ? nullptr : function();
-  if (formats == nullptr) return Error{fmt::format("{} is not PADE's module", kModule)};
-  const OtherFormats ours;
-  if (formats->pade != ours.pade || formats->opencv != ours.opencv) {
-    return Error{fmt::format("found {} of version {} with OpenCV {}, expected {} with OpenCV {}", kModule,
-                             formats->pade, formats->opencv, ours.pade, ours.opencv)};
-  }
-  return formats;
-}
-
 const Result<const OtherFormats*>& other_formats_module() {
-  static const Result<const OtherFormats*> kLoaded = load_module();
+  static const Result<const OtherFormats*> kLoaded = load_module<OtherFormats>(
+      {"libpade_image_formats.so", other_formats_symbol, "PADE's module for it",
+       "the package pade-image-formats, or libopencv-imgcodecs-dev where PADE is built"});
   return kLoaded;
 }
 

@@ -58,6 +58,5 @@ struct VideoModule {
 
 /// The module's one symbol.
 inline constexpr const char* video_module_symbol = "pade_video_module";
-using VideoModuleFunction = const VideoModule* (*)();
 
 }  // namespace pade::live

@@ -9,38 +9,15 @@
 #include <thread>
 #include <utility>
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
+#include "pade/io/loaded_module.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/live/camera/video_clock.hpp"
 #include "pade/live/camera/video_module.hpp"
 
 namespace pade::live {
 namespace {
-
-constexpr const char* kVideoModule = "libpade_video.so";
-
-/// The module, or why there is none. It stays until the process ends: what it brings cannot be unloaded.
-Result<const VideoModule*> load_video_module() {
-  void* const library = ::dlopen(kVideoModule, RTLD_NOW | RTLD_LOCAL);
-  if (library == nullptr) {
-    const char* const reason = ::dlerror();
-    return Error{
-        fmt::format("PADE's module for videos cannot be loaded ({}), expected the package pade-video, or "
-                    "libavformat-dev, "
-                    "libavcodec-dev and libswscale-dev where PADE is built",
-                    reason == nullptr ? kVideoModule : reason)};
-  }
-  const auto function = reinterpret_cast<VideoModuleFunction>(::dlsym(library, video_module_symbol));
-  const VideoModule* const found = function == nullptr ? nullptr : function();
-  if (found == nullptr) return Error{fmt::format("{} is not PADE's module", kVideoModule)};
-  const VideoModule ours;
-  if (found->pade != ours.pade || found->opencv != ours.opencv)
-    return Error{fmt::format("found {} of version {} with OpenCV {}, expected {} with OpenCV {}",
-                             kVideoModule, found->pade, found->opencv, ours.pade, ours.opencv)};
-  return found;
-}
 
 Status check_size(const std::string& name, const cv::Mat& image, const Camera& camera) {
   if (image.cols == camera.width && image.rows == camera.height) return {};
@@ -217,7 +194,9 @@ Result<std::unique_ptr<FrameSource>> open_video_file(const VideoModule& library,
 }  // namespace
 
 const Result<const VideoModule*>& video_module() {
-  static const Result<const VideoModule*> kLoaded = load_video_module();
+  static const Result<const VideoModule*> kLoaded = io::load_module<VideoModule>(
+      {"libpade_video.so", video_module_symbol, "PADE's module for videos",
+       "the package pade-video, or libavformat-dev, libavcodec-dev and libswscale-dev where PADE is built"});
   return kLoaded;
 }
 
