@@ -79,7 +79,7 @@ Result<Scene> load_scene(const fs::path& file, const SimulateArguments& argument
 
 Status render(const Scene& scene, Flight flight, const fs::path& out, const SimulateArguments& arguments,
               const SequenceOptions& options, const std::string& label) {
-  if (arguments.colour) flight.image.colour = true;
+  if (arguments.colour) flight.image.colour = flight.states_colour = true;
   std::optional<Progress> line;
   int known = 0;
   return write_sequence(scene, flight, out, options, [&](int done, int total) {

@@ -296,6 +296,30 @@ TEST_F(SimulatedSequence, EveryShippedWorldIsWhatTheGeneratorMakes) {
   }
 }
 
+TEST(FlightFile, LeavesColourAndNoiseToTheWorldWhereItStatesNone) {
+  const std::string points = "waypoints: [{position: [0, 0, 2]}, {position: [5, 0, 2]}]\n";
+  World world;
+  CameraSensor sensor;
+  sensor.colour = true;
+  sensor.noise_deviation = 0.02;
+  world.cameras.push_back(sensor);
+  const auto image = [&](const std::string& text, const World& of) {
+    const auto flight = parse_flight(points + text, "f.yaml");
+    EXPECT_TRUE(flight) << flight.error().message;
+    return flight_camera(*flight, of).image;
+  };
+  EXPECT_TRUE(image("", world).colour);
+  EXPECT_EQ(image("", world).read_noise, 0.02);
+  EXPECT_FALSE(image("image: {colour: false}\n", world).colour);
+  EXPECT_EQ(image("image: {colour: false}\n", world).read_noise, 0.02);
+  EXPECT_EQ(image("image: {read_noise: 0.004}\n", world).read_noise, 0.004);
+  EXPECT_FALSE(image("", World{}).colour);
+  world.cameras[0].colour.reset();
+  world.cameras[0].noise_deviation.reset();
+  EXPECT_FALSE(image("", world).colour) << "its format is not stated either";
+  EXPECT_EQ(image("", world).read_noise, ImageOptions{}.read_noise);
+}
+
 TEST(FlightFile, NamesFileLineAndFieldOfWhatIsWrong) {
   const auto message = [](const std::string& text) {
     const auto flight = parse_flight(text, "f.yaml");

@@ -87,11 +87,35 @@ TEST_F(SdfReader, ReadsACameraAsItIsMounted) {
   ASSERT_EQ(result->cameras.size(), 1U);
   const CameraSensor& camera = result->cameras[0];
   EXPECT_NEAR(camera.camera.fx, 554.256, 1e-3);
-  EXPECT_FALSE(camera.colour);
+  EXPECT_EQ(camera.colour, false);
   EXPECT_EQ(camera.rate, 20);
   EXPECT_LT((camera.T_body_camera.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(),
             1e-12);
   EXPECT_LT((camera.T_body_camera.translation - Eigen::Vector3d(0.1, 0, 0.05)).norm(), 1e-12);
+}
+
+TEST(SdfReader, OfACameraSaysWhatThePictureDoesNotShow) {
+  const auto read = [](const std::string& image, const std::string& rest) {
+    return read_sdf(world(model(kBox) +
+                          "<model name='q'><link name='l'><sensor name='c' type='camera'><camera>"
+                          "<horizontal_fov>1</horizontal_fov><image><width>640</width><height>480</height>" +
+                          image + "</image>" + rest + "</camera></sensor></link></model>"));
+  };
+  const auto plain = read("", "");
+  ASSERT_TRUE(plain) << plain.error().message;
+  ASSERT_EQ(plain->cameras.size(), 1U);
+  EXPECT_FALSE(plain->cameras[0].colour) << "nothing is stated";
+  EXPECT_THAT(plain->warnings, testing::Not(testing::Contains(testing::HasSubstr("is passed over"))));
+  const auto odd = read("<format>R8G8B8</format>",
+                        "<lens><type>stereographic</type><intrinsics><fx>500</fx><fy>500</fy><cx>320</cx>"
+                        "<cy>240</cy><s>3</s></intrinsics></lens><distortion><k1>0.1</k1>"
+                        "<center>0.4 0.5</center></distortion><noise><type>gaussian</type>"
+                        "<mean>0.1</mean><stddev>0.02</stddev></noise>");
+  ASSERT_TRUE(odd) << odd.error().message;
+  EXPECT_EQ(odd->cameras[0].colour, true);
+  EXPECT_EQ(odd->cameras[0].noise_deviation, 0.02);
+  for (const char* const what : {"<lens> <type> stereographic", "<center> 0.4 0.5", "<s> 3", "<mean> 0.1"})
+    EXPECT_THAT(odd->warnings, testing::Contains(testing::HasSubstr(what)));
 }
 
 TEST_F(SdfReader, FindsIncludedModelsMeshesAndImages) {

@@ -301,6 +301,10 @@ Result<Flight> parse_flight(std::string_view text, const std::string& file) {
     if (!point) return point.error();
     flight.waypoints.push_back(*point);
   }
+  if (const Yaml* image = root->find("image")) {
+    flight.states_colour = image->find("colour") != nullptr;
+    flight.states_read_noise = image->find("read_noise") != nullptr;
+  }
   if (const Yaml* camera = root->find("camera")) {
     if (const Status s = read_camera(*camera, file, flight); !s) return s.error();
   }

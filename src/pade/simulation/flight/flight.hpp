@@ -24,8 +24,9 @@ struct SensorOptions {
   SensorGrade imu = SensorGrade::industrial;
   double imu_rate = 200;  ///< Hz
   double gnss_rate = 5;   ///< Hz
-  double gnss_latency =
-      0;  ///< s between the moment of measurement (the stamp) and its arrival; sets the order of rows
+  /// s between the moment of measurement (the stamp) and its arrival: what has not arrived at the end of the
+  /// flight is in no file. Files have no times of arrival.
+  double gnss_latency = 0;
   bool gnss_carrier_phase = false;
   double baro_rate = 20;  ///< Hz
   double mag_rate = 20;   ///< Hz
@@ -36,7 +37,8 @@ struct SensorOptions {
     field("imu", self.imu, "grade of the inertial sensors");
     field("imu_rate", self.imu_rate, "Hz");
     field("gnss_rate", self.gnss_rate, "Hz");
-    field("gnss_latency", self.gnss_latency, "s from measurement to arrival");
+    field("gnss_latency", self.gnss_latency,
+          "s from measurement to arrival: what is later than the end is left out");
     field("gnss_carrier_phase", self.gnss_carrier_phase, "centimetres instead of metres");
     field("baro_rate", self.baro_rate, "Hz");
     field("mag_rate", self.mag_rate, "Hz");
@@ -59,6 +61,8 @@ struct Flight {
   std::optional<Camera> camera;  ///< without it the first camera of the world, else 640 x 480 with f = 554.26
   std::optional<Pose> T_body_camera;  ///< without it as in the world, else looking along body x
   ImageOptions image;
+  bool states_colour = false;  ///< `image.colour`; else that of the world's camera counts, where it has one
+  bool states_read_noise = false;  ///< the same of `image.read_noise`
   SensorOptions sensors;
 };
 

@@ -69,7 +69,7 @@ std::string record(const Scene& scene, const Flight& flight, const FlightCamera&
         {"distortion", c.coefficients},
         {"translation", row(camera.T_body_camera.translation)},
         {"rotation", row(rotation_log(camera.T_body_camera.rotation))}}},
-      {"image", io::json_of(flight.image)},
+      {"image", io::json_of(camera.image)},
       {"sensors", io::json_of(flight.sensors)},
       {"render", io::json_of(options.render)},
       {"seed", options.seed},
@@ -184,7 +184,7 @@ class Recorder {
         stations_(std::move(stations)),
         work_(std::move(work)),
         maker_(scene, camera.camera,
-               {flight.image, options.render, flight.exposure_time, flight.blur_samples, options.seed,
+               {camera.image, options.render, flight.exposure_time, flight.blur_samples, options.seed,
                 options.threads}) {}
 
   Status record(const FrameProgress& progress) const;
@@ -299,6 +299,13 @@ FlightCamera flight_camera(const Flight& flight, const World& world) {
   if (!world.cameras.empty()) {
     out.camera = world.cameras.front().camera;
     out.T_body_camera = world.cameras.front().T_body_camera;
+  }
+  out.image = flight.image;
+  if (!world.cameras.empty()) {
+    const CameraSensor& sensor = world.cameras.front();
+    if (!flight.states_colour) out.image.colour = sensor.colour.value_or(out.image.colour);
+    if (!flight.states_read_noise)
+      out.image.read_noise = sensor.noise_deviation.value_or(out.image.read_noise);
   }
   if (flight.camera) out.camera = *flight.camera;
   if (flight.T_body_camera) out.T_body_camera = *flight.T_body_camera;

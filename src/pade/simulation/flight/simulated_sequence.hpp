@@ -33,6 +33,7 @@ using FrameProgress = std::function<void(int, int)>;
 struct FlightCamera {
   Camera camera;
   Pose T_body_camera;
+  ImageOptions image;
 };
 FlightCamera flight_camera(const Flight& flight, const World& world);
 

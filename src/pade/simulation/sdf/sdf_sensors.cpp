@@ -6,6 +6,35 @@
 #include <sdf/sdf.hh>
 
 namespace pade::simulation {
+namespace {
+
+/// Whether a file says it itself, rather than the format's default.
+bool is_stated(const sdf::ElementPtr& element, const char* outer, const char* inner) {
+  if (!element || !element->HasElement(outer)) return false;
+  const sdf::ElementPtr part = element->GetElement(outer);
+  return part->HasElement(inner) && part->GetElement(inner)->GetExplicitlySetInFile();
+}
+
+/// What of a camera the picture does not show.
+void warn_of_camera(const sdf::Camera& source, const std::string& where, World& world) {
+  const auto warn = [&](const std::string& what) {
+    world.warnings.push_back(fmt::format("{} is passed over: {}", where, what));
+  };
+  const std::string lens = source.LensType();
+  if (const auto element = source.Element();
+      element && element->HasElement("lens") && is_stated(element, "lens", "type") && lens != "gnomonical")
+    warn(fmt::format("<lens> <type> {}: the picture is that of a gnomonical lens", lens));
+  constexpr double kMiddle = 0.5;
+  if (source.DistortionCenter() != ignition::math::Vector2d(kMiddle, kMiddle))
+    warn(fmt::format("<distortion> <center> {} {}: the distortion is about the principal point",
+                     source.DistortionCenter().X(), source.DistortionCenter().Y()));
+  if (source.HasLensIntrinsics() && source.LensIntrinsicsSkew() != 0)
+    warn(fmt::format("<intrinsics> <s> {}: the pixels are rectangular", source.LensIntrinsicsSkew()));
+  if (source.ImageNoise().Type() != sdf::NoiseType::NONE && source.ImageNoise().Mean() != 0)
+    warn(fmt::format("<noise> <mean> {}", source.ImageNoise().Mean()));
+}
+
+}  // namespace
 
 Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_sensor, const std::string& name,
                   const std::string& file, World& world) {
@@ -16,8 +45,9 @@ Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_sensor, const s
     // Gazebo's camera looks along the x axis of its frame.
     camera.T_body_camera =
         T_model_sensor * Pose{Eigen::Quaterniond(forward_camera_rotation()), Eigen::Vector3d::Zero()};
-    camera.colour = source->PixelFormat() != sdf::PixelFormatType::L_INT8 &&
-                    source->PixelFormat() != sdf::PixelFormatType::L_INT16;
+    if (is_stated(source->Element(), "image", "format"))
+      camera.colour = source->PixelFormat() != sdf::PixelFormatType::L_INT8 &&
+                      source->PixelFormat() != sdf::PixelFormatType::L_INT16;
     Camera& c = camera.camera;
     c.width = static_cast<int>(source->ImageWidth());
     c.height = static_cast<int>(source->ImageHeight());
@@ -43,6 +73,7 @@ Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_sensor, const s
     }
     if (source->ImageNoise().Type() == sdf::NoiseType::GAUSSIAN)
       camera.noise_deviation = source->ImageNoise().StdDev();
+    warn_of_camera(*source, fmt::format("{}: camera '{}'", file, name), world);
     world.cameras.push_back(std::move(camera));
   } else if (const sdf::Imu* source_imu = sensor.ImuSensor()) {
     ImuSensor imu;

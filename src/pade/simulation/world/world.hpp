@@ -81,8 +81,8 @@ struct Sun {
 struct CameraSensor {
   std::string name;
   Camera camera;
-  bool colour = true;
-  double rate = 10;                       ///< frames per second
+  std::optional<bool> colour;             ///< its pixel format; empty: it states none
+  double rate = 10;                       ///< frames per second; a flight has its own
   Pose T_body_camera;                     ///< optical camera frame to the frame of its model
   std::optional<double> noise_deviation;  ///< standard deviation of the read noise, fraction of full scale
 };
