@@ -260,7 +260,7 @@ TEST_F(DamagedSequence, NothingButNanIsRefused) {
 
 TEST_F(DamagedSequence, MissingPoseFileIsRefused) {
   std::filesystem::remove(folder_ / "groundtruth.txt");
-  expect_refused({"groundtruth.txt: no such file"});
+  expect_refused({"groundtruth.txt: no such file", "--poses from-imu-gnss", "--log"});
 }
 
 TEST_F(DamagedSequence, UnsortedPosesAreSortedAndDuplicatesSkipped) {

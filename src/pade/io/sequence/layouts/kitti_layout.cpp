@@ -169,6 +169,8 @@ Result<SequenceListing> read_kitti_layout(const fs::path& folder, const LayoutCh
         "{}: the KITTI layout has no original poses, expected groundtruth or a pose file", folder.string())};
   }
   listing.pose_file = choice.poses == "groundtruth" ? own_pose_file(folder) : fs::path(choice.poses);
+  if (choice.poses == "groundtruth" && !path_exists(listing.pose_file))
+    return Error{fmt::format("{}: no such file, {}", listing.pose_file.string(), kWherePosesComeFrom)};
   auto trajectory = read_poses(listing.pose_file, *times, report);
   if (!trajectory) return trajectory.error();
   listing.trajectory = std::move(*trajectory);

@@ -55,6 +55,12 @@ struct LayoutChoice {
   bool mounting_alone = false;             ///< a calibration file may state T_body_camera without a camera
 };
 
+/// What a user of a folder without poses is told.
+inline constexpr std::string_view kWherePosesComeFrom =
+    "expected the poses of the flight; --poses FILE names them elsewhere, --poses from-imu-gnss makes them "
+    "from imu.csv "
+    "and gnss.csv (--log: from a log beside the images)";
+
 Result<SequenceListing> read_tum_layout(const std::filesystem::path& folder, const LayoutChoice& choice,
                                         ReadReport& report);
 Result<SequenceListing> read_euroc_layout(const std::filesystem::path& folder, const LayoutChoice& choice,

@@ -191,6 +191,8 @@ Result<SequenceListing> read_tum_layout(const fs::path& folder, const LayoutChoi
 
   if (choice.computed) return listing;
   listing.pose_file = pose_file(folder, choice.poses);
+  if (choice.poses == "groundtruth" && !path_exists(listing.pose_file))
+    return Error{fmt::format("{}: no such file, {}", listing.pose_file.string(), kWherePosesComeFrom)};
   auto trajectory = read_any_poses(listing.pose_file, times_of(listing.images), report);
   if (!trajectory) return trajectory.error();
   listing.trajectory = std::move(*trajectory);
