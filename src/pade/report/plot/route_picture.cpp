@@ -87,7 +87,8 @@ std::string route_picture(const mapping::MapView& view, std::span<const Vector3d
   std::string svg = fmt::format(
       "<svg xmlns='http://www.w3.org/2000/svg' width='{:.0f}' height='{:.0f}' viewBox='0 0 {:.3f} {:.3f}'>\n"
       "<title>Route from above: black occupied, white free, grey unknown</title>\n"
-      "<style>.o{{fill:#222}}.f{{fill:#fff}}polyline{{fill:none;stroke-linecap:round}}</style>\n"
+      "<style>rect{{shape-rendering:crispEdges}}.o{{fill:#222}}.f{{fill:#fff}}polyline{{fill:none;stroke-"
+      "linecap:round}}</style>\n"
       "<rect width='100%' height='100%' fill='#bbb'/>\n",
       scale * size.x(), scale * size.y(), size.x(), size.y());
   svg += cells(view, box, side);
