@@ -84,6 +84,7 @@ endif()
 # Where systemd looks beside the packages' own.
 configure_file(${PROJECT_SOURCE_DIR}/config/systemd/pade-live@.service.in ${PROJECT_BINARY_DIR}/pade-live@.service @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/pade-live@.service DESTINATION lib/systemd/system COMPONENT pade)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/config/live DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/pade/examples COMPONENT pade)
 set(_packages pade libpade-dev)
 if(TARGET pade_image_formats)
   list(APPEND _packages pade-image-formats)

@@ -219,6 +219,32 @@ TEST_F(LiveCommand, LooksForItsInputsBesideItsConfiguration) {
   EXPECT_THAT(test::shell(command).text, HasSubstr("2 frames: "));
 }
 
+/// With a recorded flight in place of the camera; an unknown field or a wrong value would be refused before
+/// that.
+TEST_F(LiveCommand, TheConfigurationToBeginWithIsUnderstood) {
+  const fs::path shipped = fs::path(PADE_SOURCE_DIR) / "config" / "live";
+  auto text = io::read_file(shipped / "vehicle.yaml");
+  ASSERT_TRUE(text) << text.error().message;
+  const auto put = [&](const std::string& old, const std::string& now) {
+    const std::size_t at = text->find(old);
+    ASSERT_NE(at, std::string::npos) << old;
+    text->replace(at, old.size(), now);
+  };
+  record(3);
+  put("kind: v4l2", "kind: folder");
+  put("/dev/video0", (folder_ / "flight").string());
+  put("/dev/ttyAMA0", fmt::format("udp:{}", kPort));
+  std::ofstream(folder_ / "vehicle.yaml") << *text;
+  fs::copy_file(folder_ / "flight" / "camera.yaml", folder_ / "camera.yaml");
+  const test::Outcome out =
+      test::shell(fmt::format("cd {} && {} live --for 1 vehicle.yaml", folder_.string(), test::kPade));
+  EXPECT_THAT(out.text, HasSubstr("3 frames: "));
+  const test::Outcome lens =
+      test::shell(fmt::format("{} info {}", test::kPade, (shipped / "camera.yaml").string()));
+  EXPECT_EQ(lens.code, 0) << lens.text;
+  EXPECT_THAT(lens.text, HasSubstr("looking along (1, 0, 0)"));
+}
+
 TEST_F(LiveCommand, TheServiceIsStartedAgainHoweverOftenItFails) {
   const auto unit = io::read_file(fs::path(PADE_SOURCE_DIR) / "config" / "systemd" / "pade-live@.service.in");
   ASSERT_TRUE(unit);

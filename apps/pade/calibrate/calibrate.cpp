@@ -204,9 +204,9 @@ void add_one(CLI::App& calibrate_command, Context& context, bool mounting) {
       "overlap.\n"
       "No poses, no GNSS and no guess are needed; turns about two axes are. docs/calibration.md has the "
       "how-to.\n"
-      "Examples:\n"
-      "  pade calibrate time images --imu flight.ulg\n"
-      "  pade calibrate time flight.bag");
+      "Examples:\n" +
+      fmt::format("  pade calibrate {0} images --imu flight.ulg\n  pade calibrate {0} flight.bag",
+                  mounting ? "mounting" : "time"));
   command->add_option("images", a->images, "folder or recording with the images (docs/sequences.md)")
       ->required();
   command->add_option(

@@ -402,7 +402,8 @@ void add_live(CLI::App& app, Context& context) {
   command->footer(
       "Runs until SIGTERM or Ctrl-C, saves the map meanwhile and at the end. docs/live.md has the wiring, "
       "the autopilots' parameters and the file.\n"
-      "What does not exist yet: signing, RTSP and video files.");
+      "A file to begin with is config/live/vehicle.yaml. Not there yet: signing of packets, "
+      "ONBOARD_COMPUTER_STATUS.");
   command
       ->add_option("CONFIG", arguments->config, "YAML: camera, link, session, sectors, mapper, map, web, dds")
       ->required();
