@@ -12,6 +12,11 @@
 namespace pade {
 
 /// A seeded stream of uniform and normal numbers.
+///
+/// The order of the draws is part of the code. C++ leaves open in which order the arguments of a call and the
+/// operands of an expression are evaluated, and another order makes another world from the same seed. Draws
+/// therefore stand in statements of their own, or side by side in one braced list, which is evaluated from
+/// left to right.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
@@ -24,6 +29,13 @@ class Random {
   double normal() {
     const double radius = std::sqrt(-2 * std::log(1 - uniform()));
     return radius * std::cos(2 * std::numbers::pi * uniform());
+  }
+
+  /// Uniform in the box between two corners, drawn in the order z, y, x.
+  Eigen::Vector3d uniform_zyx(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    Eigen::Vector3d value;
+    for (int i = 2; i >= 0; --i) value[i] = uniform(low[i], high[i]);
+    return value;
   }
 
   /// Three independent standard normals, drawn in the order x, y, z.

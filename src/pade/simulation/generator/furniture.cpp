@@ -36,8 +36,7 @@ void Furniture::add_stone_meshes() {
 void Furniture::tree(const Vector3d& foot, double scale) {
   const int kind = static_cast<int>(kTrees * random_.uniform());
   const double yaw = random_.uniform(0, 2 * kPi);
-  const Vector3d size =
-      scale * Vector3d(random_.uniform(0.9, 1.15), random_.uniform(0.9, 1.15), random_.uniform(0.9, 1.2));
+  const Vector3d size = scale * random_.uniform_zyx({0.9, 0.9, 0.9}, {1.15, 1.15, 1.2});
   out_.model("tree");
   out_.mesh(fmt::format("tree{}_wood.obj", kind), foot, yaw, size, {"bark", tint(0.8, 1.0), 0.6});
   out_.mesh(fmt::format("tree{}_leaves.obj", kind), foot, yaw, size, {"leaves", tint(0.8, 1.0)});

@@ -113,7 +113,9 @@ TreeMeshes grow_tree(const TreeShape& shape, Random& random) {
   constexpr int kSteps = 6;
   for (int i = 1; i <= kSteps; ++i) {
     const double bend = 0.05 * i;
-    trunk.emplace_back(random.uniform(-bend, bend), random.uniform(-bend, bend), height * i / kSteps);
+    const double y = random.uniform(-bend, bend);
+    const double x = random.uniform(-bend, bend);
+    trunk.emplace_back(x, y, height * i / kSteps);
   }
   tube(wood, trunk, 1.15 * radius, 0.25 * radius, 10);
   const int branches = 11 + static_cast<int>(4 * random.uniform());
@@ -142,7 +144,8 @@ TreeMeshes grow_tree(const TreeShape& shape, Random& random) {
       const double along = random.uniform(0.4, 1.0) * 4;
       const auto k = std::min<std::size_t>(static_cast<std::size_t>(along), 3);
       const Eigen::Vector3d at = path[k] + (along - static_cast<double>(k)) * (path[k + 1] - path[k]);
-      leaf(leaves, at + 0.2 * length * random.normal3(), random.uniform(0.14, 0.26), random);
+      const double size = random.uniform(0.14, 0.26);
+      leaf(leaves, at + 0.2 * length * random.normal3(), size, random);
     }
   }
   return {wood.str(), leaves.str()};

@@ -92,10 +92,12 @@ void OpenGenerator::leaning_trunk(const Vector3d& foot) {
   const double azimuth = random_.uniform(0, 2 * kPi);
   const double lean = random_.uniform(0.2, 1.0);
   const double length = random_.uniform(2.5, 5);
+  const Finish bark{"bark", tint(0.7, 1.0), 0.6};
+  const double radius = random_.uniform(0.06, 0.14);
   out_.rod(foot,
            foot + length * Vector3d(std::sin(lean) * std::cos(azimuth), std::sin(lean) * std::sin(azimuth),
                                     std::cos(lean)),
-           random_.uniform(0.06, 0.14), {"bark", tint(0.7, 1.0), 0.6});
+           radius, bark);
 }
 
 OpenWorld OpenGenerator::forest() {
@@ -109,9 +111,11 @@ OpenWorld OpenGenerator::forest() {
   out_.model("undergrowth");
   scatter(trees / 4, kHalfWidth, 1.2, [&](const Vector3d& foot) {
     const double size = random_.uniform(0.8, 1.6);
-    out_.mesh(fmt::format("stone{}.obj", static_cast<int>(kStones * random_.uniform())), foot,
-              random_.uniform(0, 2 * kPi), size * Vector3d(0.9, 0.8, random_.uniform(1.0, 2.6)),
-              {"leaves", tint(0.7, 1.0)});
+    const Finish leaves{"leaves", tint(0.7, 1.0)};
+    const double height = random_.uniform(1.0, 2.6);
+    const double yaw = random_.uniform(0, 2 * kPi);
+    const int kind = static_cast<int>(kStones * random_.uniform());
+    out_.mesh(fmt::format("stone{}.obj", kind), foot, yaw, size * Vector3d(0.9, 0.8, height), leaves);
   });
   scatter(trees / 16, kHalfWidth, 5, [&](const Vector3d& foot) { leaning_trunk(foot); });
   stones(160, 20);
@@ -121,22 +125,22 @@ OpenWorld OpenGenerator::forest() {
 void OpenGenerator::pillar(const Vector3d& foot) {
   const double height = random_.uniform(1.2, 5.5);
   const double width = random_.uniform(0.3, 0.6);
-  out_.box(foot + Vector3d(0, 0, 0.5 * height), {width, width, height}, {"concrete", tint(0.7, 1.0)},
-           {random_.uniform(-0.15, 0.15), random_.uniform(-0.1, 0.1), random_.uniform(0, 1)});
+  const Vector3d turn{random_.uniform(-0.15, 0.15), random_.uniform(-0.1, 0.1), random_.uniform(0, 1)};
+  out_.box(foot + Vector3d(0, 0, 0.5 * height), {width, width, height}, {"concrete", tint(0.7, 1.0)}, turn);
 }
 
 void OpenGenerator::pole(const Vector3d& foot, double radius) {
-  out_.rod(foot,
-           foot + Vector3d(random_.uniform(-0.5, 0.5), random_.uniform(-0.5, 0.5), random_.uniform(2, 4.5)),
-           radius, random_.uniform() < 0.5 ? finish::rust : finish::metal);
+  const Finish& finish = random_.uniform() < 0.5 ? finish::rust : finish::metal;
+  out_.rod(foot, foot + random_.uniform_zyx({-0.5, -0.5, 2}, {0.5, 0.5, 4.5}), radius, finish);
 }
 
 void OpenGenerator::slab(const Vector3d& foot) {
   const bool bare = random_.uniform() < 0.4;
-  out_.box(foot + Vector3d(0, 0, random_.uniform(0.6, 1.6)),
-           {random_.uniform(1.5, 3), random_.uniform(1, 2.5), 0.22},
-           bare ? Finish{"plaster", tint(0.75, 0.95), 1, 0.5} : Finish{"concrete", tint(0.7, 1.0)},
-           {random_.uniform(-1, 1), random_.uniform(-0.6, 0.6), random_.uniform(0, 2 * kPi)});
+  const Vector3d turn{random_.uniform(-1, 1), random_.uniform(-0.6, 0.6), random_.uniform(0, 2 * kPi)};
+  const Finish finish =
+      bare ? Finish{"plaster", tint(0.75, 0.95), 1, 0.5} : Finish{"concrete", tint(0.7, 1.0)};
+  const Vector3d size{random_.uniform(1.5, 3), random_.uniform(1, 2.5), 0.22};
+  out_.box(foot + Vector3d(0, 0, random_.uniform(0.6, 1.6)), size, finish, turn);
 }
 
 /// A stone that would reach into the room about start or goal is drawn like the others and left out, so that
@@ -149,11 +153,12 @@ void OpenGenerator::stones(int things, double half_width) {
   };
   out_.model("stones");
   for (int i = 0; i < things; ++i) {
-    const Vector3d at(random_.uniform(kWest, kEast), random_.uniform(-half_width, half_width),
-                      random_.uniform(0, 0.1));
-    lay(fmt::format("stone{}.obj", static_cast<int>(kStones * random_.uniform())), at,
-        random_.uniform(0, 2 * kPi), random_.uniform(0.15, 0.7) * Vector3d(1.2, 1, 0.7),
-        {"concrete", tint(0.6, 0.95), 0.6, 1.4});
+    const Vector3d at = random_.uniform_zyx({kWest, -half_width, 0}, {kEast, half_width, 0.1});
+    const Finish concrete{"concrete", tint(0.6, 0.95), 0.6, 1.4};
+    const double size = random_.uniform(0.15, 0.7);
+    const double yaw = random_.uniform(0, 2 * kPi);
+    const int kind = static_cast<int>(kStones * random_.uniform());
+    lay(fmt::format("stone{}.obj", kind), at, yaw, size * Vector3d(1.2, 1, 0.7), concrete);
   }
 }
 
@@ -181,9 +186,11 @@ OpenWorld OpenGenerator::rubble() {
       pole(foot, random_.uniform(0.02, 0.05));
     } else {
       const double size = random_.uniform(0.8, 2.2);
-      out_.mesh(fmt::format("stone{}.obj", static_cast<int>(kStones * random_.uniform())), foot,
-                random_.uniform(0, 2 * kPi), size * Vector3d(1.1, 1, random_.uniform(0.8, 1.4)),
-                {"brick", tint(0.8, 1.0)});
+      const Finish brick{"brick", tint(0.8, 1.0)};
+      const double height = random_.uniform(0.8, 1.4);
+      const double yaw = random_.uniform(0, 2 * kPi);
+      const int kind = static_cast<int>(kStones * random_.uniform());
+      out_.mesh(fmt::format("stone{}.obj", kind), foot, yaw, size * Vector3d(1.1, 1, height), brick);
     }
   });
   for (double x = 6; x < 56; x += random_.uniform(4, 9)) wire(x, 12);
@@ -194,9 +201,10 @@ OpenWorld OpenGenerator::rubble() {
 void OpenGenerator::wall_piece(const Vector3d& foot) {
   const double length = random_.uniform(1.5, 4);
   const double height = random_.uniform(1.0, 3.2);
+  const double yaw = random_.uniform() < 0.5 ? 0 : 0.5 * kPi;
   out_.box(foot + Vector3d(0, 0, 0.5 * height), {length, 0.24, height},
            random_.uniform() < 0.6 ? Finish{"brick", tint(0.8, 1.0)} : Finish{"concrete", tint(0.7, 1.0)},
-           {0, 0, random_.uniform() < 0.5 ? 0 : 0.5 * kPi});
+           {0, 0, yaw});
 }
 
 void OpenGenerator::scaffold(const Vector3d& foot) {
@@ -213,10 +221,10 @@ void OpenGenerator::scaffold(const Vector3d& foot) {
 void OpenGenerator::stack(const Vector3d& foot) {
   const double yaw = random_.uniform(0, kPi);
   const double height = random_.uniform(0.6, 2.2);
+  const Finish finish =
+      random_.uniform() < 0.5 ? Finish{"bark", tint(0.7, 1.0)} : Finish{"brick", tint(0.8, 1.0)};
   out_.box(foot + Vector3d(0, 0, 0.5 * height),
-           {random_.uniform(0.8, 1.8), random_.uniform(0.8, 1.4), height},
-           random_.uniform() < 0.5 ? Finish{"bark", tint(0.7, 1.0)} : Finish{"brick", tint(0.8, 1.0)},
-           {0, 0, yaw});
+           {random_.uniform(0.8, 1.8), random_.uniform(0.8, 1.4), height}, finish, {0, 0, yaw});
 }
 
 OpenWorld OpenGenerator::building_site() {
@@ -238,8 +246,9 @@ OpenWorld OpenGenerator::building_site() {
     } else if (what < 0.95) {
       pole(foot, random_.uniform(0.025, 0.06));
     } else {
+      const double yaw = random_.uniform(0, kPi);
       out_.box(foot + Vector3d(0, 0, 1.25), {3.2, 2.2, 2.5}, {"concrete", tint(0.5, 0.9), 0.6, 1.2},
-               {0, 0, random_.uniform(0, kPi)});
+               {0, 0, yaw});
     }
   });
   for (double x = 6; x < 56; x += random_.uniform(5, 11)) wire(x, 12);
@@ -256,7 +265,8 @@ OpenWorld OpenGenerator::street() {
   for (const double side : {-1.0, 1.0}) {
     for (double x = -24; x < 84;) {
       const double width = random_.uniform(7, 13);
-      house(x, x + width, side * 9.5, random_.uniform(8, 12), random_.uniform(5.5, 12.5));
+      const double height = random_.uniform(5.5, 12.5);
+      house(x, x + width, side * 9.5, random_.uniform(8, 12), height);
       x += width + 0.1;
     }
   }
@@ -270,7 +280,8 @@ OpenWorld OpenGenerator::street() {
     } else if (what < 0.75) {
       tree(foot, random_.uniform(0.5, 0.8));
     } else if (what < 0.9) {
-      lamp(foot, random_.uniform(2.6, 4.5), random_.uniform() < 0.5 ? 1.2 : -1.2);
+      const double toward_y = random_.uniform() < 0.5 ? 1.2 : -1.2;
+      lamp(foot, random_.uniform(2.6, 4.5), toward_y);
     } else {
       out_.model("bin");
       out_.cylinder(foot + Vector3d(0, 0, 0.7), 0.45, 1.4, {"concrete", tint(0.5, 0.9), 0.4, 1.4});

@@ -103,8 +103,10 @@ WorldFiles Generator::building() {
   }
   scaffold();
   lift_shaft();
-  for (int i = 0; i < 7; ++i)
-    lamp({22.9, -12.5 + 3.6 * i + random_.uniform(-0.5, 0.5), 0}, random_.uniform(2.6, 3.6), 0.5);
+  for (int i = 0; i < 7; ++i) {
+    const double height = random_.uniform(2.6, 3.6);
+    lamp({22.9, -12.5 + 3.6 * i + random_.uniform(-0.5, 0.5), 0}, height, 0.5);
+  }
   hedges();
   for (int i = 0; i < 9; ++i) {
     const double y = -15 + 4 * i + random_.uniform(-1, 1);
@@ -123,8 +125,9 @@ WorldFiles Generator::building() {
   }
   for (int i = 0; i < 24; ++i) {
     const double angle = random_.uniform(0.25 * kPi, 1.75 * kPi);
+    const double scale = random_.uniform(1.0, 1.5);
     tree({8 + random_.uniform(22, 45) * std::cos(angle), random_.uniform(22, 45) * std::sin(angle), 0},
-         random_.uniform(1.0, 1.5));
+         scale);
   }
   for (int i = 0; i < 4; ++i)
     out_.box({13 + 2.0 * i, 0.9 - 0.1 * i, 0.35}, {1.2, 0.45, 0.7}, {"leaves", tint(0.7, 1.0)});
@@ -146,8 +149,9 @@ WorldFiles Generator::street() {
     double x = -32;
     while (x < 84) {
       const double width = random_.uniform(7, 13);
-      house(x, x + width, side * random_.uniform(6.8, 7.8), random_.uniform(8, 12),
-            random_.uniform(5.5, 12.5));
+      const double height = random_.uniform(5.5, 12.5);
+      const double depth = random_.uniform(8, 12);
+      house(x, x + width, side * random_.uniform(6.8, 7.8), depth, height);
       x += width + (random_.uniform() < 0.3 ? random_.uniform(1.5, 4) : 0.1);
     }
     for (double at = -26; at < 76; at += random_.uniform(5.5, 9)) {
@@ -163,9 +167,10 @@ WorldFiles Generator::street() {
     }
   }
   out_.model("wires");
-  for (double at = -10; at < 70; at += random_.uniform(6, 11))
-    out_.rod({at, -7.2, random_.uniform(4.6, 5.4)},
-             {at + random_.uniform(-1, 1), 7.2, random_.uniform(4.6, 5.4)}, 0.02, finish::wire);
+  for (double at = -10; at < 70; at += random_.uniform(6, 11)) {
+    const Vector3d to{at + random_.uniform(-1, 1), 7.2, random_.uniform(4.6, 5.4)};
+    out_.rod({at, -7.2, random_.uniform(4.6, 5.4)}, to, 0.02, finish::wire);
+  }
   for (double at = 2; at < 64; at += random_.uniform(7, 10)) {  // signs beside the lane
     const double side = random_.uniform() < 0.5 ? -1 : 1;
     out_.rod({at, side * 1.75, 0}, {at, side * 1.75, 2.5}, 0.03, finish::metal);
@@ -184,7 +189,8 @@ WorldFiles Generator::forest() {
   out_.model("ground");
   out_.ground({20, 0, 0}, {200, 200}, {"grass", {0.95, 0.9, 0.75}});
   for (int i = -1; i < 10; ++i) {  // the row to be flown around
-    tree({7.0 * i, random_.uniform(-0.15, 0.15), 0}, random_.uniform(0.95, 1.15));
+    const double scale = random_.uniform(0.95, 1.15);
+    tree({7.0 * i, random_.uniform(-0.15, 0.15), 0}, scale);
   }
   for (int i = 0; i < 260; ++i) {
     const double x = random_.uniform(-25, 85);
@@ -196,19 +202,23 @@ WorldFiles Generator::forest() {
   out_.model("undergrowth");
   for (int i = 0; i < 160; ++i) {
     const double y = random_.uniform(-12, 12);
-    const Vector3d at(random_.uniform(-8, 60), y, random_.uniform(0, 0.1));
+    const double z = random_.uniform(0, 0.1);
+    const double x = random_.uniform(-8, 60);
     const double size = random_.uniform(0.2, 0.7);
     const int kind = static_cast<int>(kStones * random_.uniform());
     const bool bush = random_.uniform() < 0.55;
-    out_.mesh(fmt::format("stone{}.obj", kind), at, random_.uniform(0, 2 * kPi),
-              size * Vector3d(1.3, 1, bush ? 1.2 : 0.6),
-              bush ? Finish{"leaves", tint(0.7, 1.0)} : Finish{"concrete", tint(0.6, 0.9), 0.5, 1.6});
+    const Finish finish =
+        bush ? Finish{"leaves", tint(0.7, 1.0)} : Finish{"concrete", tint(0.6, 0.9), 0.5, 1.6};
+    const double yaw = random_.uniform(0, 2 * kPi);
+    out_.mesh(fmt::format("stone{}.obj", kind), {x, y, z}, yaw, size * Vector3d(1.3, 1, bush ? 1.2 : 0.6),
+              finish);
   }
   for (int i = 0; i < 10; ++i) {  // fallen trunks
-    const Vector3d at(random_.uniform(0, 55), random_.uniform(-10, 10), 0.18);
+    const double y = random_.uniform(-10, 10);
+    const Vector3d at(random_.uniform(0, 55), y, 0.18);
     const double angle = random_.uniform(0, kPi);
-    out_.rod(at, at + random_.uniform(2, 5) * Vector3d(std::cos(angle), std::sin(angle), 0.02), 0.17,
-             {"bark", tint(0.7, 1.0), 0.6});
+    const Finish bark{"bark", tint(0.7, 1.0), 0.6};
+    out_.rod(at, at + random_.uniform(2, 5) * Vector3d(std::cos(angle), std::sin(angle), 0.02), 0.17, bark);
   }
   return out_.finish();
 }
@@ -228,8 +238,10 @@ WorldFiles Generator::rubble() {
     while (x < 62) {
       const double width = random_.uniform(2.5, 6);
       const double height = random_.uniform(1.5, 6);
-      slab({x + 0.5 * width, side * random_.uniform(6.2, 7.4), 0.5 * height}, {width, 0.35, height},
-           {random_.uniform(-0.08, 0.08), 0, random_.uniform(-0.06, 0.06)}, random_.uniform() < 0.6);
+      const bool bare = random_.uniform() < 0.6;
+      const Vector3d turn{random_.uniform(-0.08, 0.08), 0, random_.uniform(-0.06, 0.06)};
+      slab({x + 0.5 * width, side * random_.uniform(6.2, 7.4), 0.5 * height}, {width, 0.35, height}, turn,
+           bare);
       x += width + (random_.uniform() < 0.35 ? random_.uniform(0.5, 2) : 0.0);
     }
     for (double at = -12; at < 60; at += random_.uniform(3.5, 5)) {
@@ -238,18 +250,17 @@ WorldFiles Generator::rubble() {
       slab({at, y, 0.5 * height}, {0.45, 0.45, height},
            {random_.uniform(-0.15, 0.15), random_.uniform(-0.1, 0.1), random_.uniform(0, 1)}, false);
       for (int i = 0; i < 4; ++i) {  // reinforcement that sticks out
-        const Vector3d top(at + random_.uniform(-0.15, 0.15), y + random_.uniform(-0.15, 0.15), height);
-        out_.rod(
-            top,
-            top + Vector3d(random_.uniform(-0.4, 0.4), random_.uniform(-0.4, 0.4), random_.uniform(0.4, 1.3)),
-            0.012, finish::rust);
+        const double top_y = y + random_.uniform(-0.15, 0.15);
+        const Vector3d top(at + random_.uniform(-0.15, 0.15), top_y, height);
+        out_.rod(top, top + random_.uniform_zyx({-0.4, -0.4, 0.4}, {0.4, 0.4, 1.3}), 0.012, finish::rust);
       }
     }
     for (double at = -8; at < 58; at += random_.uniform(4, 7)) {
-      slab({at, side * random_.uniform(3.2, 4.8), random_.uniform(0.8, 1.6)},
-           {random_.uniform(2, 3.5), random_.uniform(2, 3), 0.22},
-           {side * random_.uniform(0.5, 0.9), random_.uniform(-0.3, 0.3), random_.uniform(-0.5, 0.5)},
-           random_.uniform() < 0.4);
+      const bool bare = random_.uniform() < 0.4;
+      const Vector3d turn{side * random_.uniform(0.5, 0.9), random_.uniform(-0.3, 0.3),
+                          random_.uniform(-0.5, 0.5)};
+      const Vector3d size{random_.uniform(2, 3.5), random_.uniform(2, 3), 0.22};
+      slab({at, side * random_.uniform(3.2, 4.8), random_.uniform(0.8, 1.6)}, size, turn, bare);
     }
   }
   out_.model("poles");
@@ -261,20 +272,23 @@ WorldFiles Generator::rubble() {
              {at + random_.uniform(-0.2, 0.2), y + side * random_.uniform(0, 0.5), random_.uniform(1.8, 4)},
              bare ? 0.015 : 0.045, bare ? finish::rust : finish::metal);
   }
-  for (double at = -4; at < 60; at += random_.uniform(3, 6))
-    out_.rod({at, -6.3, random_.uniform(2.6, 4.6)},
-             {at + random_.uniform(-2, 2), 6.3, random_.uniform(2.6, 4.6)}, 0.008, finish::wire);
-  for (double at = 3; at < 60; at += random_.uniform(7, 10))
-    slab({at, random_.uniform(-0.6, 0.6), random_.uniform(3.3, 4.2)}, {0.4, 13, 0.45},
-         {random_.uniform(-0.12, 0.12), 0, random_.uniform(-0.2, 0.2)}, false);
+  for (double at = -4; at < 60; at += random_.uniform(3, 6)) {
+    const Vector3d to{at + random_.uniform(-2, 2), 6.3, random_.uniform(2.6, 4.6)};
+    out_.rod({at, -6.3, random_.uniform(2.6, 4.6)}, to, 0.008, finish::wire);
+  }
+  for (double at = 3; at < 60; at += random_.uniform(7, 10)) {
+    const Vector3d turn{random_.uniform(-0.12, 0.12), 0, random_.uniform(-0.2, 0.2)};
+    slab({at, random_.uniform(-0.6, 0.6), random_.uniform(3.3, 4.2)}, {0.4, 13, 0.45}, turn, false);
+  }
   out_.model("stones");
   for (int i = 0; i < 380; ++i) {
-    const Vector3d at(random_.uniform(-12, 62), random_.uniform(-6.4, 6.4), random_.uniform(0, 0.15));
+    const Vector3d at = random_.uniform_zyx({-12, -6.4, 0}, {62, 6.4, 0.15});
     const double size = std::abs(at.y()) < 1 ? random_.uniform(0.1, 0.5) : random_.uniform(0.2, 1.3);
-    out_.mesh(
-        fmt::format("stone{}.obj", static_cast<int>(kStones * random_.uniform())), at,
-        random_.uniform(0, 2 * kPi), size * Vector3d(1.2, 1, 0.7),
-        random_.uniform() < 0.7 ? Finish{"concrete", tint(0.7, 1.0), 0.6} : Finish{"brick", tint(0.8, 1.0)});
+    const Finish finish =
+        random_.uniform() < 0.7 ? Finish{"concrete", tint(0.7, 1.0), 0.6} : Finish{"brick", tint(0.8, 1.0)};
+    const double yaw = random_.uniform(0, 2 * kPi);
+    const int kind = static_cast<int>(kStones * random_.uniform());
+    out_.mesh(fmt::format("stone{}.obj", kind), at, yaw, size * Vector3d(1.2, 1, 0.7), finish);
   }
   slab({64, 0, 4}, {0.4, 22, 8}, {0, -0.05, 0.05}, true);
   windows_facing_x(63.7, -9, 9, 1, 7, -1);
@@ -334,9 +348,11 @@ WorldFiles Generator::corridor() {
   }
   out_.model("outside");
   out_.ground({kMiddle, 0, -0.3}, {200, 200}, {"grass"});
-  for (int i = 0; i < 12; ++i)
-    out_.box({kFrom + 5.0 * i, random_.uniform(9, 16), random_.uniform(1, 3)}, {random_.uniform(2, 5), 2, 6},
-             {"brick", tint(0.7, 1.0)});
+  for (int i = 0; i < 12; ++i) {
+    const Finish brick{"brick", tint(0.7, 1.0)};
+    const double length = random_.uniform(2, 5);
+    out_.box({kFrom + 5.0 * i, random_.uniform(9, 16), random_.uniform(1, 3)}, {length, 2, 6}, brick);
+  }
   return out_.finish();
 }
 

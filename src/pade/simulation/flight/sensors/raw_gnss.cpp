@@ -134,7 +134,8 @@ gnss::Signal RawGnss::measure(const Visible& v, Time gps_time, bool has_phase) {
   const double longer = random_.uniform(model_.reflected_least, model_.reflected_most);
   const bool slipped = random_.uniform() < model_.slips;
   const bool said = random_.uniform() < model_.slips_said;
-  const double cycles = std::floor(random_.uniform(1, 21)) * (random_.uniform() < 0.5 ? -1 : 1);
+  const double slip = std::floor(random_.uniform(1, 21));
+  const double cycles = random_.uniform() < 0.5 ? -slip : slip;
   const double whole = std::floor(random_.uniform(-1e6, 1e6));
 
   gnss::Signal signal;
