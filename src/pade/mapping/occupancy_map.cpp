@@ -265,6 +265,7 @@ MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera,
 MapChange OccupancyMap::forget(Time now) {
   MapChange change;
   if (scratch_->ages) scratch_->ages->forget(now, *voxels_, change);
+  put_in_order(change.touched);
   return change;
 }
 

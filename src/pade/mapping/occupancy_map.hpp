@@ -103,7 +103,9 @@ struct MapCell {
 struct MapChange {
   std::vector<MapCell> became_occupied;  ///< from unknown or from free
   std::vector<MapCell> became_free;      ///< from unknown or from occupied
-  std::vector<MapCell> became_unknown;   ///< from free, not seen for MapOptions::forget_after
+  /// From free, not seen for MapOptions::forget_after. Comes before the other two: what is forgotten and seen
+  /// again at once is in both.
+  std::vector<MapCell> became_unknown;
   /// Cubes of 8 voxels to a side, or larger ones, in which an occupancy may have changed: what a MapView
   /// takes over.
   std::vector<MapCell> touched;

@@ -161,7 +161,9 @@ void LocalPlanner::choose_primitive(const Task& task) {
     const double speed = share * plan_.speed_limit;
     for (const double yaw_rate : kYawRates) {
       for (const double climb : kClimbs) {
-        const double most = speed * std::tan(limits.nose_angle);  // the velocity stays near the nose
+        // The velocity stays near the nose: at a right angle and beyond, any climb does.
+        const double most =
+            limits.nose_angle < 0.5 * std::numbers::pi ? speed * std::tan(limits.nose_angle) : kInfinity;
         const MotionCommand command{speed, 0, std::clamp(climb, -most, most), yaw_rate, swing};
         foretell(task.from, command, hold, options_.step, limits, candidate_);
         if (!is_in_bounds(task, candidate_, plan_.peering) ||

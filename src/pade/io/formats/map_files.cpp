@@ -99,6 +99,7 @@ class StructureCheck {
  private:
   [[nodiscard]] std::string_view problem(bool whole) const {
     if (too_deep_) return "the tree is deeper than 16 levels";
+    if (empty_) return "an inner node has no child";
     if (not_finite_) return "a probability is not a finite number";
     if (!whole) return "the file ends";
     return rest_.empty() ? "the tree ends" : "the tree ends before the file";
@@ -134,6 +135,8 @@ class StructureCheck {
     children |= static_cast<unsigned>(byte()) << 8U;
     ++nodes_;
     if (children != 0 && depth == mapping::kTreeDepth) return !(too_deep_ = true);
+    // OctoMap would make a leaf of it, as free as can be; only the root may have none: all is one unknown.
+    if (children == 0 && depth > 0) return !(empty_ = true);
     for (unsigned i = 0; i < 8; ++i) {
       const unsigned kind = children >> (2 * i) & 3U;
       if (kind == 3 && !binary(depth + 1)) return false;
@@ -146,6 +149,7 @@ class StructureCheck {
   std::string_view rest_;
   std::size_t nodes_ = 0;
   bool too_deep_ = false;
+  bool empty_ = false;
   bool not_finite_ = false;
 };
 
@@ -278,6 +282,10 @@ Result<mapping::OccupancyMap> decode_map(std::string_view content, std::string_v
   if (header->nodes > 0) {
     std::istringstream data{std::string(header->data)};
     if (header->format == MapFormat::bt) {
+      // It makes these of "free" and "occupied", and else its own, which another threshold may take
+      // otherwise.
+      tree->setClampingThresMin(options.clamp_min);
+      tree->setClampingThresMax(options.clamp_max);
       tree->readBinaryData(data);
     } else {
       tree->readData(data);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -43,9 +42,10 @@ void count(const TileTree& tiles, const VoxelIndex& v, Contents& contents, int& 
   highest = std::max<int>(highest, tile.log_odds[index_in_tile(v)]);
 }
 
-/// A tile that knows anything, by the Morton code of its place among the tiles.
+/// A tile that knows anything, or a larger cube of tiles that are all the same.
 struct PlacedTile {
-  std::uint64_t code;
+  std::uint64_t code;  // of its first voxel
+  unsigned depth;      // of the cube in the octree
   const Tile* tile;
 };
 
@@ -56,26 +56,66 @@ bool knows_anything(const Tile& tile) {
 
 bool is_uniform(const Tile& tile) {
   const std::uint64_t occupied = tile.any_occupied ? ~std::uint64_t{0} : 0;
-  return !tile.any_unknown && std::all_of(tile.words.begin(), tile.words.end(), [&](const Tile::Word& word) {
-    return word.occupied == occupied;
-  }) && std::all_of(tile.log_odds.begin(), tile.log_odds.end(), [&](std::int8_t value) {
-    return value == tile.log_odds[0];
-  });
+  return !tile.any_unknown && tile.log_odds.is_same_all_over() &&
+         std::all_of(tile.words.begin(), tile.words.end(),
+                     [&](const Tile::Word& word) { return word.occupied == occupied; });
 }
 
-void visit_tile(const PlacedTile& placed, double step, const std::function<void(const MapLeaf&)>& visitor) {
-  const Tile& tile = *placed.tile;
-  const std::uint64_t first = placed.code << 9U;
-  const auto log_odds = [&](std::size_t i) { return static_cast<float>(step * tile.log_odds[i]); };
-  if (is_uniform(tile))
-    return visitor({first, kTileDepth, log_odds(0), tile.at(0, 0, 0) == Occupancy::occupied});
-  for (std::uint64_t i = 0; i < tile.log_odds.size(); ++i) {
-    const VoxelKey v = morton_key(i);
-    const Occupancy state = tile.at(v[0], v[1], v[2]);
-    if (state != Occupancy::unknown)
-      visitor({first + i, kTreeDepth, log_odds(i), state == Occupancy::occupied});
+/// Leaves of one tile: as few as say the same.
+class TileLeaves {
+ public:
+  TileLeaves(const TileTree& tiles, const std::function<void(const MapLeaf&)>& visitor)
+      : tiles_(tiles), visitor_(visitor) {}
+
+  void visit(const PlacedTile& placed) {
+    if (is_uniform(*placed.tile))
+      return say(placed.code, placed.depth, placed.tile->at(0, 0, 0), placed.tile->log_odds[0]);
+    for (std::size_t i = 0; i < kVoxels; ++i) {
+      const VoxelKey v = morton_key(i);
+      states_[i] = placed.tile->at(v[0], v[1], v[2]);
+      values_[i] = placed.tile->log_odds[i];
+    }
+    for (std::size_t eighth = 0; eighth < kVoxels; eighth += 64) {
+      if (are_same(eighth, 64)) {
+        say(placed.code + eighth, kTileDepth + 1, states_[eighth], values_[eighth]);
+        continue;
+      }
+      for (std::size_t i = eighth; i < eighth + 64; i += 8) {
+        if (are_same(i, 8)) {
+          say(placed.code + i, kTileDepth + 2, states_[i], values_[i]);
+          continue;
+        }
+        for (std::size_t k = i; k < i + 8; ++k) say(placed.code + k, kTreeDepth, states_[k], values_[k]);
+      }
+    }
   }
-}
+
+ private:
+  static constexpr std::size_t kVoxels = 512;
+
+  [[nodiscard]] bool are_same(std::size_t from, std::size_t count) const {
+    for (std::size_t i = from + 1; i < from + count; ++i)
+      if (states_[i] != states_[from] || values_[i] != values_[from]) return false;
+    return true;
+  }
+  /// The steps of the log-odds are coarse, the state is not.
+  void say(std::uint64_t code, unsigned depth, Occupancy state, std::int8_t value) const {
+    if (state == Occupancy::unknown) return;
+    auto log_odds = static_cast<float>(tiles_.step * value);
+    const bool is_occupied = state == Occupancy::occupied;
+    if (is_occupied) {
+      log_odds = std::max(log_odds, tiles_.occupied);
+    } else if (log_odds >= tiles_.occupied) {
+      log_odds = std::nextafter(tiles_.occupied, -std::numeric_limits<float>::infinity());
+    }
+    visitor_({code, depth, log_odds, is_occupied});
+  }
+
+  const TileTree& tiles_;
+  const std::function<void(const MapLeaf&)>& visitor_;
+  std::array<Occupancy, kVoxels> states_{};
+  std::array<std::int8_t, kVoxels> values_{};
+};
 
 constexpr int kNothingKnown = -1000;
 
@@ -120,16 +160,7 @@ std::shared_ptr<const MapView> MapView::flown(std::span<const Vector3d> path, do
   for (const auto& [place, inside] : voxels_along(path, radius, tiles_->voxel)) {
     const Tile& old = tiles_->tile(place[0], place[1], place[2]);
     if (!old.any_unknown) continue;
-    auto tile = std::make_shared<Tile>(old);
-    for (std::size_t z = 0; z < 8; ++z) {
-      std::uint64_t fresh = inside[z] & ~old.words[z].known;
-      tile->words[z].known |= fresh;
-      for (; fresh != 0; fresh &= fresh - 1)
-        tile->log_odds[index_in_tile(std::countr_zero(fresh) & 7, std::countr_zero(fresh) >> 3,
-                                     static_cast<int>(z))] = -127;
-    }
-    tile->summarise();
-    changed.emplace_back(place, std::move(tile));
+    changed.emplace_back(place, with_free(old, inside));
   }
   return std::shared_ptr<const MapView>(new MapView(with_tiles(*tiles_, std::move(changed)), window_));
 }
@@ -199,22 +230,36 @@ void MapView::for_each_leaf(const std::function<void(const MapLeaf&)>& visitor) 
   std::vector<PlacedTile> known;
   constexpr int kSide = 1 << TileGroup::kBits;  // tiles of a group
   const auto group_of = [](int tile) { return tile / kSide; };
+  const TileGroup* nothing = nullptr;  // all groups of which nothing is known are one
   for (int z = group_of(bounds.first[2]); z <= group_of(bounds.last[2]); ++z)
     for (int y = group_of(bounds.first[1]); y <= group_of(bounds.last[1]); ++y)
       for (int x = group_of(bounds.first[0]); x <= group_of(bounds.last[0]); ++x) {
         const TileGroup& group = tiles_->group(x, y, z);
-        for (unsigned i = 0; i < group.children.size(); ++i) {
-          if (!knows_anything(*group.children[i])) continue;
-          const auto key = [&](int of_group, unsigned inside) {
-            return static_cast<std::uint16_t>(of_group * kSide + static_cast<int>(inside & 7U));
+        if (&group == nothing) continue;
+        const auto code_of = [&](unsigned i) {
+          const auto key = [](int of_group, unsigned inside) {
+            return static_cast<std::uint16_t>((of_group * kSide + static_cast<int>(inside & 7U)) * kTileSide);
           };
-          known.push_back(
-              {morton_code({key(x, i), key(y, i >> 3U), key(z, i >> 6U)}), group.children[i].get()});
+          return morton_code({key(x, i), key(y, i >> 3U), key(z, i >> 6U)});
+        };
+        const Tile* const first = group.children[0].get();
+        const bool is_one = std::all_of(group.children.begin(), group.children.end(),
+                                        [&](const auto& child) { return child.get() == first; });
+        if (is_one && is_uniform(*first)) {
+          known.push_back({code_of(0), kTileDepth - TileGroup::kBits, first});
+          continue;
         }
+        const std::size_t before = known.size();
+        for (unsigned i = 0; i < group.children.size(); ++i) {
+          if (knows_anything(*group.children[i]))
+            known.push_back({code_of(i), kTileDepth, group.children[i].get()});
+        }
+        if (known.size() == before) nothing = &group;
       }
   std::sort(known.begin(), known.end(),
             [](const PlacedTile& a, const PlacedTile& b) { return a.code < b.code; });
-  for (const PlacedTile& tile : known) visit_tile(tile, tiles_->step, visitor);
+  TileLeaves leaves(*tiles_, visitor);
+  for (const PlacedTile& tile : known) leaves.visit(tile);
 }
 
 }  // namespace pade::mapping

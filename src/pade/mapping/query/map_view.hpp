@@ -110,8 +110,9 @@ class MapView {
   [[nodiscard]] std::optional<Hit> sweep(std::span<const Eigen::Vector3d> path, double radius,
                                          UnknownSpace unknown) const;
 
-  /// Calls `visitor` for every known cube in the order of OctoMap's octree: single voxels, and cubes of 8 to
-  /// a side that are the same all over. Log-odds to 0.5 % of their range.
+  /// Calls `visitor` for every known cube in the order of OctoMap's octree: single voxels, and cubes of 2, 4,
+  /// 8 and 64 to a side that are the same all over. Log-odds to 0.5 % of their range, and always on the side
+  /// of the threshold that the voxel's state is on.
   void for_each_leaf(const std::function<void(const MapLeaf&)>& visitor) const;
 
   /// For the room's own searches.

@@ -1,6 +1,8 @@
 #include "pade/mapping/query/tile_builder.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <mutex>
 #include <optional>
@@ -100,14 +102,33 @@ void add_eighth(std::uint64_t rows, std::size_t eighth, std::uint64_t Tile::Word
   }
 }
 
+/// One value if all known voxels of the eighth have it.
+void add_log_odds(std::uint64_t known, std::size_t eighth, const std::array<std::int8_t, 64>& values,
+                  TileLogOdds& log_odds) {
+  const std::int8_t first = known == 0 ? 0 : values[static_cast<std::size_t>(std::countr_zero(known))];
+  bool same = true;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    same = same && ((known >> i & 1U) == 0 || values[i] == first);
+  if (same) {
+    log_odds.set_same(eighth, first);
+  } else {
+    log_odds.set_values(eighth, values);
+  }
+}
+
 std::shared_ptr<const Tile> make_tile(const VoxelStore& voxels, const VoxelTile& from, float per_step) {
   auto tile = std::make_shared<Tile>();
   for (std::size_t eighth = 0; eighth < 8; ++eighth) {
     add_eighth(in_rows(from.known[eighth]), eighth, &Tile::Word::known, *tile);
     add_eighth(in_rows(from.occupied[eighth]), eighth, &Tile::Word::occupied, *tile);
+    if (from.values[eighth] == VoxelTile::kNoValues) {
+      tile->log_odds.set_same(eighth, quantised(from.same[eighth], per_step));
+      continue;
+    }
     const EighthValues values = voxels.values_of(from, eighth);
-    for (std::size_t i = 0; i < values.size(); ++i)
-      tile->log_odds[64 * eighth + i] = quantised(values[i], per_step);
+    std::array<std::int8_t, 64> steps{};
+    for (std::size_t i = 0; i < values.size(); ++i) steps[i] = quantised(values[i], per_step);
+    add_log_odds(from.known[eighth], eighth, steps, tile->log_odds);
   }
   tile->summarise();
   return tile;
@@ -305,6 +326,7 @@ TileTree empty_tiles(const VoxelStore& voxels, double voxel) {
   TileTree tiles;
   tiles.voxel = voxel;
   tiles.per_voxel = 1 / tiles.voxel;
+  tiles.occupied = voxels.rules().occupied;
   const double most = std::max(std::abs(voxels.rules().least), std::abs(voxels.rules().most));
   tiles.step = std::max(most, 1e-3) / 127;
   tiles.uniform = std::make_shared<UniformTiles>();
@@ -320,6 +342,30 @@ TileTree rebuilt(TileTree tiles, const VoxelStore& voxels, std::span<const Touch
   tiles.world = builder.build<TileWorld>(0, tiles.world, touched);
   tiles.index();
   return tiles;
+}
+
+std::shared_ptr<const Tile> with_free(const Tile& old, const std::array<std::uint64_t, 8>& words) {
+  auto tile = std::make_shared<Tile>(old);
+  std::array<std::uint64_t, 8> fresh{}, known{};  // in Morton order
+  for (int z = 0; z < kTileSide; ++z) {
+    Tile::Word& word = tile->words[static_cast<std::size_t>(z)];
+    const std::uint64_t added = words[static_cast<std::size_t>(z)] & ~word.known;
+    word.known |= added;
+    for (int bit = 0; bit < 64; ++bit) {
+      const std::size_t voxel = index_in_tile(bit & 7, bit >> 3, z);
+      fresh[voxel / 64] |= (added >> bit & 1U) << voxel % 64;
+      known[voxel / 64] |= (word.known >> bit & 1U) << voxel % 64;
+    }
+  }
+  tile->log_odds.fill(0);
+  for (std::size_t eighth = 0; eighth < 8; ++eighth) {
+    std::array<std::int8_t, 64> values{};
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = (fresh[eighth] >> i & 1U) != 0 ? std::int8_t{-127} : old.log_odds[64 * eighth + i];
+    add_log_odds(known[eighth], eighth, values, tile->log_odds);
+  }
+  tile->summarise();
+  return tile;
 }
 
 TileTree with_tiles(TileTree tiles, std::vector<Changed> changed) {

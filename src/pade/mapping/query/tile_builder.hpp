@@ -2,6 +2,7 @@
 // some places.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -30,6 +31,9 @@ TileTree empty_tiles(const VoxelStore& voxels, double voxel);
 /// @param window   in tiles; outside all is unknown
 TileTree rebuilt(TileTree tiles, const VoxelStore& voxels, std::span<const TouchedCube> touched,
                  const TileBounds& window);
+
+/// The tile with the unknown ones of some voxels (words as in Tile) as free as can be.
+std::shared_ptr<const Tile> with_free(const Tile& old, const std::array<std::uint64_t, 8>& words);
 
 /// The tree with other tiles in some places (tile coordinates, each once).
 TileTree with_tiles(TileTree tiles, std::vector<std::pair<VoxelIndex, std::shared_ptr<const Tile>>> changed);

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -26,6 +28,40 @@ inline constexpr int kVoxelsPerAxis = 65536;
 inline constexpr int kTileSide = 8;  // voxels
 inline constexpr int kTilesPerAxis = kVoxelsPerAxis / kTileSide;
 
+/// Log-odds of the known voxels of a tile, in steps of TileTree::step, by the low nine bits of the Morton
+/// code. Most eighths of most tiles have one value all over, free or seen once: it is kept once.
+class TileLogOdds {
+ public:
+  [[nodiscard]] std::int8_t operator[](std::size_t voxel) const {
+    const std::size_t eighth = voxel / 64;
+    if ((mixed_ >> eighth & 1U) == 0) return same_[eighth];
+    const auto before = static_cast<std::size_t>(std::popcount(mixed_ & ((1U << eighth) - 1U)));
+    return values_[64 * before + voxel % 64];
+  }
+  /// Whether all voxels have one value, where all are known.
+  [[nodiscard]] bool is_same_all_over() const {
+    for (const std::int8_t value : same_)
+      if (value != same_[0]) return false;
+    return mixed_ == 0;
+  }
+  void fill(std::int8_t value) {
+    same_.fill(value);
+    values_.clear();
+    mixed_ = 0;
+  }
+  /// Of an eighth; each at most once, in rising order, on top of what fill() or nothing has left.
+  void set_same(std::size_t eighth, std::int8_t value) { same_[eighth] = value; }
+  void set_values(std::size_t eighth, const std::array<std::int8_t, 64>& values) {
+    mixed_ |= 1U << eighth;
+    values_.insert(values_.end(), values.begin(), values.end());
+  }
+
+ private:
+  std::array<std::int8_t, 8> same_{};
+  unsigned mixed_ = 0;               // a bit for each eighth that has values of its own
+  std::vector<std::int8_t> values_;  // of those, one after the other
+};
+
 /// 8 x 8 x 8 voxels: word z, bit 8 y + x.
 struct Tile {
   struct Word {
@@ -33,8 +69,7 @@ struct Tile {
     std::uint64_t occupied = 0;
   };
   std::array<Word, 8> words{};
-  std::array<std::int8_t, 512>
-      log_odds{};  ///< in steps of TileTree::step(), of known voxels, in Morton order
+  TileLogOdds log_odds;
   bool any_occupied = false;
   bool any_unknown = true;
 
@@ -86,6 +121,7 @@ struct TileTree {
   double voxel = 0;                       ///< m
   double per_voxel = 0;                   ///< 1 / voxel
   double step = 0;                        ///< of the log-odds in a tile
+  float occupied = 0;                     ///< log-odds at and above which a voxel is occupied
   /// The groups within the bounds, x fastest, where they are not too many: a way past the upper nodes.
   std::vector<const TileGroup*> groups;
   VoxelIndex first_group{};

@@ -231,7 +231,7 @@ void VoxelStore::miss(VoxelTile& tile, std::size_t eighth, std::uint64_t voxels)
     value = added(value, rules_.miss);
     const std::uint64_t mask = std::uint64_t{1} << bit;
     if (value <= rules_.least) tile.least[eighth] |= mask;
-    if (value < rules_.occupied) tile.occupied[eighth] &= ~mask;
+    tile.occupied[eighth] = is_occupied(value) ? tile.occupied[eighth] | mask : tile.occupied[eighth] & ~mask;
   }
 }
 
