@@ -164,10 +164,12 @@ void Running::run_mapper() {
         jumps_ = reply.jumps;
         begin_anew(reply.last_jump);
       }
-      if (reply.kind == PoseReply::Kind::valid)
+      if (reply.kind == PoseReply::Kind::valid) {
         map_frame(*frame, reply);
-      else
+      } else {
         skip(reply.why.empty() ? "no pose in time" : reply.why);
+        forget(Time{frame->message.stamp});
+      }
       const std::lock_guard lock(mutex_);
       if (over_ || !anew_.empty() || !errands_.empty()) break;
     }

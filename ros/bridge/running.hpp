@@ -81,6 +81,7 @@ class Running : public Bridge {
   void keep_within_the_map(const Eigen::Vector3d& place);
   [[nodiscard]] pade::Matrix6d motion_covariance(pade::Time time);
   void take_view(pade::Time time, const pade::mapping::MapChange& change);
+  void forget(pade::Time time);
   void begin_anew(const std::string& why);
   void skip(const std::string& reason);
   void say(Diagnosis::Level level, const std::string& text);

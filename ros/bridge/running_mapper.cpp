@@ -95,6 +95,13 @@ void Running::take_view(Time time, const pade::mapping::MapChange& change) {
   ever_mapped_ = true;
 }
 
+/// What nobody has seen again for so long as MapOptions::forget_after says, where a frame is not mapped.
+void Running::forget(Time time) {
+  if (!mapper_ || mapped_anew_ == 0) return;
+  const pade::mapping::MapChange change = mapper_->forget(time);
+  if (!change.touched.empty()) take_view(time, change);
+}
+
 void Running::map_frame(const WaitingFrame& frame, const PoseReply& reply) {
   const double begin = steady_seconds();
   std::shared_ptr<const Eye> eye;
@@ -118,6 +125,7 @@ void Running::map_frame(const WaitingFrame& frame, const PoseReply& reply) {
   const MapperUpdate& update = mapper_->add(*image, time, T_map_camera, motion_covariance(time));
   if (update.outcome == MapperUpdate::Outcome::skipped) {
     if (mapped_anew_ > 0 && !update.change.touched.empty()) take_view(time, update.change);  // what it forgot
+    forget(time);
     return skip(kind_of(update.reason));
   }
   last_ = time;

@@ -159,6 +159,38 @@ TEST_F(MapOnDisk, OfAnEarlierSessionIsNotWrittenOverByAnEmptyOne) {
   EXPECT_FALSE(fs::exists(file("map-2.bt"))) << "its own is written over";
 }
 
+/// Without them another threshold would be taken, and what was there before would say where on Earth this
+/// lies.
+TEST_F(MapOnDisk, ItsOptionsAndItsOriginLieBesideIt) {
+  for (const char* const name : {"map.bt", "map.ot", "map.json"})
+    std::ofstream(file(name)) << "earlier " << name;
+  mapping::MapOptions options;
+  options.occupancy_threshold = 0.4;
+  const auto expect_beside = [&](const std::string& name, double x) {
+    const auto read = io::options_beside(file(name));
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->occupancy_threshold, 0.4) << name;
+    EXPECT_EQ(io::local_origin_of(file(name)).x(), x) << name;
+  };
+  MapSaver saver(file("map.bt"), 0.02, options);
+  LiveUpdate update = update_with(walls(1));
+  update.origin.x() = 100;
+  saver.take(update);
+  ASSERT_TRUE(within_seconds(5, [&] { return saver.report().saved > 0; }));
+  expect_beside("map.bt", 100);
+  EXPECT_EQ(saver.report().earlier, file("map-1.bt").string());
+  for (const char* const extension : {".bt", ".ot", ".json"})
+    EXPECT_EQ(content(fmt::format("map-1{}", extension)), fmt::format("earlier map{}", extension));
+  EXPECT_FALSE(fs::exists(file("map.ot"))) << "it would be read by what lies beside another map";
+  saver.begin_anew();
+  update.origin.x() = 3000;
+  saver.take(update);
+  saver.finish();
+  ASSERT_TRUE(saver.write_last(std::move(OccupancyMap::create(options)).value()));
+  expect_beside("map-2.bt", 100);
+  expect_beside("map.bt", 3000);
+}
+
 /// What cannot be moved stays.
 TEST_F(MapOnDisk, OfAnEarlierSessionThatCannotBeMovedStays) {
   // Longer than a name may be once it has its number.
@@ -206,6 +238,12 @@ TEST_F(MapOnDisk, IsWholeAfterFiftyKills) {
     ASSERT_TRUE(saved) << "kill " << kill;
     for (const auto& entry : fs::directory_iterator(folder_)) {
       if (!entry.path().filename().string().starts_with("map")) continue;  // half of one, under a hidden name
+      if (entry.path().extension() == ".json") {
+        EXPECT_TRUE(io::decode_local_origin(content(entry.path().filename().string()), "map.json"))
+            << "kill " << kill;
+        fs::remove(entry.path());
+        continue;
+      }
       const std::string left = content(entry.path().filename().string());
       ASSERT_THAT(bytes, testing::Contains(left)) << "kill " << kill << ": " << left.size() << " bytes";
       ++there;

@@ -69,7 +69,14 @@ class Gatherer : public Sink {
     last = update;
   }
   void begin_anew() override { ++begun_anew; }
+  void forget(const std::shared_ptr<const mapping::MapView>& view,
+              const mapping::MapChange& change) override {
+    EXPECT_FALSE(change.became_unknown.empty());
+    last.view = view;
+    ++forgotten;
+  }
   int begun_anew = 0;
+  int forgotten = 0;
   std::vector<double> ages;
   LiveUpdate last;
   std::atomic<int> pause{0};  // ms
@@ -89,7 +96,9 @@ class Covariances : public InputSink {
 
 /// A session for some seconds.
 struct Bed {
-  explicit Bed(double rate, InputSink* recorder = nullptr) : camera(rate), poses(camera.zero) {
+  explicit Bed(double rate, InputSink* recorder = nullptr, double forget_after = 0)
+      : camera(rate), poses(camera.zero) {
+    mapper.map.forget_after = forget_after;
     Pose mounting;
     mounting.rotation = Eigen::Quaterniond(forward_camera_rotation());
     mapper.map.voxel = 0.25;  // a pixel sees 5 cm of the wall
@@ -303,6 +312,27 @@ TEST(Session, AJumpWithoutAPoseKeepsTheMap) {
   });
   EXPECT_EQ(counts.restarts, 0U);
   EXPECT_FALSE(bed.session->map().bounds().isEmpty());
+}
+
+std::size_t free_voxels(const mapping::MapView& view) { return view.in_box(view.bounds()).free; }
+
+/// Whether the camera stands still or its frames have no poses: what nobody sees again is not known for ever.
+TEST(Session, ForgetsFreeSpaceWhereNothingIsMapped) {
+  for (const bool no_frames : {true, false}) {
+    Bed bed(15, nullptr, 0.4);
+    std::size_t most = 0;
+    const auto& counts = bed.run(3, [&](double elapsed) {
+      if (elapsed <= 1.2 && bed.gatherer.last.view)
+        most = std::max(most, free_voxels(*bed.gatherer.last.view));
+      bed.camera.stalled = no_frames && elapsed > 1.2;
+      bed.poses.come = no_frames || elapsed <= 1.2;
+    });
+    EXPECT_GT(counts.mapped, 5U) << no_frames;
+    ASSERT_GT(most, 100U) << no_frames;
+    EXPECT_GT(bed.gatherer.forgotten, 0) << no_frames;
+    EXPECT_LT(10 * free_voxels(*bed.gatherer.last.view), most) << no_frames;
+    EXPECT_EQ(bed.session->map().counts().free, free_voxels(*bed.gatherer.last.view)) << no_frames;
+  }
 }
 
 TEST(SessionRecording, MakesTheSameMapAgain) {

@@ -6,6 +6,7 @@
 
 #include "pade/mapping/occupancy_map.hpp"
 #include "pade/mapping/query/map_view.hpp"
+#include "pade/mapping/tiles/voxel_code.hpp"
 
 namespace {
 
@@ -100,6 +101,20 @@ TEST(Forget, ALongGapForgetsAllAtOnce) {
   EXPECT_EQ(map.counts().free, 0U);
   map.integrate(wall(1e6 + 0.1), camera(), looking({0, 0, 0}));
   EXPECT_GT(map.counts().free, 1000U);
+}
+
+/// Several periods at once: what is touched is in order, each place once, as after one image.
+TEST(Forget, WhatItTouchesIsInOrder) {
+  OccupancyMap map = made(kLife);
+  for (int i = 0; i < 8; ++i) map.integrate(wall(0.3 * i), camera(), looking({0, 0, 0}, 0.4 * i));
+  const MapChange change = map.forget(Time::from_seconds(100));
+  ASSERT_GT(change.touched.size(), 10U);
+  std::uint64_t end = 0;
+  for (const mapping::MapCell& cell : change.touched) {
+    const std::uint64_t code = mapping::morton_code(cell.key);
+    ASSERT_GE(code, end);
+    end = code + mapping::voxels_of(cell.depth);
+  }
 }
 
 TEST(Forget, NothingWithoutTheOption) {

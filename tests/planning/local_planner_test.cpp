@@ -273,6 +273,21 @@ TEST(LocalPlanner, GoesStraightInFreeSpaceAndStopsAtTheGoal) {
   EXPECT_LT((motion.back().position - goal).norm(), 1.5);
 }
 
+/// However far the velocity may be from the nose, beyond a right angle too, no plan climbs or sinks faster
+/// than a motion of the planner's own.
+TEST(LocalPlanner, ClimbsNoFasterThanItsMotionsWhateverTheAngleOfTheNose) {
+  const Balls space;
+  for (const double angle : {0.05, 0.262, 1.5, 1.6, 2.0, 2.6, 3.14}) {
+    LocalPlannerOptions options;
+    options.vehicle.nose_angle = angle;
+    LocalPlanner planner = std::move(LocalPlanner::create(options)).value();
+    const MotionState from = at_rest({0, 0, 1.6});
+    const LocalPlan& plan = planner.plan(from, {30, 0, 1.6}, space, unseen_window(from.position));
+    EXPECT_EQ(plan.kind, PlanKind::flying) << angle;
+    EXPECT_LE(std::abs(plan.command.climb), 0.5) << angle;
+  }
+}
+
 /// A bigger ball is planned for when the pose is uncertain, and more slowly.
 TEST(LocalPlanner, TheMarginGrowsWithSigma) {
   Balls space;

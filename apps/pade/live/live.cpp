@@ -340,7 +340,8 @@ Status run_live(const LiveArguments& arguments) {
     sectors.see_points(parts->camera.source->camera(), parts->camera.T_body_camera);
   std::vector<live::Sink*> sinks{&sectors};
   std::optional<live::MapSaver> saver;
-  if (!options.map.empty()) sinks.push_back(&saver.emplace(options.map, options.autosave));
+  if (!options.map.empty())
+    sinks.push_back(&saver.emplace(options.map, options.autosave, options.mapper.map));
   if (views->web) sinks.push_back(&views->web->publisher());
   if (views->topics) sinks.push_back(views->topics.get());
   sectors.listener = [&shown = *views](const auto& distances, Time frame) {

@@ -1,13 +1,19 @@
 #include "pade/live/map_saver.hpp"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <optional>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/lasting_output.hpp"
+#include "pade/io/run/run_info.hpp"
 #include "pade/mapping/query/tile_tree.hpp"
 
 namespace pade::live {
@@ -20,10 +26,13 @@ io::MapFormat format_of(const fs::path& file) {
   return file.extension() == ".ot" ? io::MapFormat::ot : io::MapFormat::bt;
 }
 
+/// What may lie beside a map and belong to it.
+constexpr std::array<std::string_view, 3> kOfAMap = {".bt", ".ot", ".json"};
+
 }  // namespace
 
-MapSaver::MapSaver(fs::path file, double every)
-    : file_(std::move(file)), every_(every), thread_([this] { work(); }) {}
+MapSaver::MapSaver(fs::path file, double every, const mapping::MapOptions& options)
+    : file_(std::move(file)), every_(every), options_(options), thread_([this] { work(); }) {}
 
 MapSaver::~MapSaver() { finish(); }
 
@@ -41,10 +50,16 @@ SaverReport MapSaver::finish() {
 
 Status MapSaver::write_last(const mapping::OccupancyMap& map) {
   if (Status status = keep_earlier(); !status) return status;
-  return io::write_lasting_file(file_, io::encode_map(map, format_of(file_)));
+  return write(file_, io::encode_map(map, format_of(file_)), origin_);
 }
 
-void MapSaver::take(const LiveUpdate& update) { keep(update.view); }
+void MapSaver::take(const LiveUpdate& update) {
+  {
+    const std::lock_guard lock(mutex_);
+    origin_ = update.origin;
+  }
+  keep(update.view);
+}
 
 void MapSaver::forget(const View& view, const mapping::MapChange& /*change*/) { keep(view); }
 
@@ -61,7 +76,7 @@ void MapSaver::begin_anew() {
     const std::lock_guard lock(mutex_);
     newest_.reset();
     if (!last_) return;  // nothing was in it
-    ended_.push_back(std::exchange(last_, nullptr));
+    ended_.push_back({std::exchange(last_, nullptr), origin_});
   }
   changed_.notify_one();
 }
@@ -72,21 +87,27 @@ SaverReport MapSaver::report() const {
 }
 
 void MapSaver::work() {
-  constexpr double kForever = 1e6;  // s
-  const std::chrono::duration<double> pause(every_ > 0 ? every_ : kForever);
+  constexpr int kBehind = 5;
+  (void)::setpriority(PRIO_PROCESS, 0, kBehind);  // this thread's: the mapper goes first
+  constexpr double kForever = 1e6;                // s
+  constexpr double kShare = 10;                   // a map that grows must not take more and more of the core
+  double pause = every_ > 0 ? every_ : kForever;
   std::unique_lock lock(mutex_);
   while (!over_ || !ended_.empty()) {
-    changed_.wait_for(lock, pause, [&] { return over_ || !ended_.empty(); });
+    changed_.wait_for(lock, std::chrono::duration<double>(pause), [&] { return over_ || !ended_.empty(); });
     while (!ended_.empty()) {
-      const View view = std::move(ended_.front());
+      const Picture picture = std::move(ended_.front());
       ended_.erase(ended_.begin());
       lock.unlock();
-      save(view, true);
+      save(picture, true);
       lock.lock();
     }
-    if (const View view = std::exchange(newest_, nullptr); view && every_ > 0 && !over_) {
+    if (const Picture picture{std::exchange(newest_, nullptr), origin_};
+        picture.view && every_ > 0 && !over_) {
       lock.unlock();
-      save(view, false);
+      const double before = io::thread_cpu_seconds();
+      save(picture, false);
+      pause = std::max(every_, kShare * (io::thread_cpu_seconds() - before));
       lock.lock();
     }
   }
@@ -98,8 +119,11 @@ fs::path MapSaver::free_name() const {
     fs::path name = file_.stem();
     name += fmt::format("-{}", number);
     name += file_.extension();
-    const fs::path numbered = file_.parent_path() / name;
-    if (!fs::exists(numbered, ignored)) return numbered;
+    fs::path numbered = file_.parent_path() / name;
+    const bool is_taken = std::any_of(kOfAMap.begin(), kOfAMap.end(), [&](std::string_view extension) {
+      return fs::exists(fs::path(numbered).replace_extension(extension), ignored);
+    });
+    if (!is_taken) return numbered;
   }
 }
 
@@ -107,23 +131,36 @@ fs::path MapSaver::free_name() const {
 Status MapSaver::keep_earlier() {
   std::error_code failed;
   if (kept_earlier_) return {};
-  if (fs::is_regular_file(file_, failed)) {
-    const fs::path numbered = free_name();
-    fs::rename(file_, numbered, failed);
+  const fs::path numbered = free_name();
+  for (const std::string_view extension : kOfAMap) {
+    const fs::path old = fs::path(file_).replace_extension(extension);
+    const fs::path now = fs::path(numbered).replace_extension(extension);
+    if (!fs::is_regular_file(old, failed)) continue;
+    fs::rename(old, now, failed);
     if (failed)
-      return Error{fmt::format("{}: the map of an earlier session cannot be moved to {}: {}", file_.string(),
-                               numbered.filename().string(), failed.message())};
+      return Error{fmt::format("{}: the map of an earlier session cannot be moved to {}: {}", old.string(),
+                               now.filename().string(), failed.message())};
     const std::lock_guard lock(mutex_);
-    report_.earlier = numbered.string();
+    if (old == file_ || report_.earlier.empty()) report_.earlier = now.string();
   }
   kept_earlier_ = true;
   return {};
 }
 
-void MapSaver::save(const View& view, bool is_finished) {
+/// What lies beside it first: a map without it would be read by other options.
+Status MapSaver::write(const fs::path& file, const io::ByteSource& map, const Eigen::Vector3d& origin) {
+  const std::string beside = io::encode_side_car(options_, std::nullopt, origin);
+  if (Status status =
+          io::write_lasting_file(io::side_car_of(file), [&](const io::ByteSink& sink) { sink(beside); });
+      !status)
+    return status;
+  return io::write_lasting_file(file, map);
+}
+
+void MapSaver::save(const Picture& picture, bool is_finished) {
   const fs::path file = is_finished ? free_name() : file_;
   Status status = is_finished ? Status() : keep_earlier();
-  if (status) status = io::write_lasting_file(file, io::encode_map(*view, format_of(file)));
+  if (status) status = write(file, io::encode_map(*picture.view, format_of(file)), picture.origin);
   const std::lock_guard lock(mutex_);
   if (!status) {
     ++report_.failed;

@@ -11,7 +11,10 @@
 #include <thread>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "pade/core/result.hpp"
+#include "pade/io/atomic_output.hpp"
 #include "pade/live/interfaces.hpp"
 #include "pade/mapping/occupancy_map.hpp"
 #include "pade/mapping/query/map_view.hpp"
@@ -28,18 +31,20 @@ struct SaverReport {
   bool any = false;                   ///< finish(): something is known of the map as it is
 };
 
-/// Writes the newest view of the map now and then, on the disk itself, in a thread of its own: whoever offers
-/// one never waits. A file is replaced as a whole or not at all, and only by the map that it already holds:
-/// those of earlier sessions and of before a jump of the poses stay, under the first free number (map-1.bt,
-/// map-2.bt, ...).
+/// Writes the newest view of the map now and then, on the disk itself, in a thread of its own that leaves the
+/// processor to others: whoever offers one never waits. Its options and its origin lie beside it (map.json,
+/// see io::encode_side_car). A file is replaced as a whole or not at all, and only by the map that it already
+/// holds: those of earlier sessions and of before a jump of the poses stay, under the first free number
+/// (map-1.bt, map-2.bt, ...), with what lay beside them.
 class MapSaver : public Sink {
   using View = std::shared_ptr<const mapping::MapView>;
 
  public:
-  /// @param file   .bt or .ot
-  /// @param every  s between the end of one and the start of the next; 0: only maps that end because the
-  /// poses jump
-  MapSaver(std::filesystem::path file, double every);
+  /// @param file     .bt or .ot
+  /// @param every    s between the end of one and the start of the next, and at least ten times the processor
+  ///                 time that the last one took; 0: only maps that end because the poses jump
+  /// @param options  of the map
+  MapSaver(std::filesystem::path file, double every, const mapping::MapOptions& options = {});
   ~MapSaver() override;
   /// Ends what is being written and maps that have ended, then the thread. The newest view is left to whoever
   /// saves the map at the end: by write_last().
@@ -56,19 +61,27 @@ class MapSaver : public Sink {
   [[nodiscard]] SaverReport report() const;
 
  private:
+  /// A map at one moment.
+  struct Picture {
+    View view;
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // LiveUpdate::origin
+  };
   void keep(const View& view);
   void work();
-  void save(const View& view, bool is_finished);
+  void save(const Picture& picture, bool is_finished);
+  Status write(const std::filesystem::path& file, const io::ByteSource& map, const Eigen::Vector3d& origin);
   [[nodiscard]] std::filesystem::path free_name() const;
   Status keep_earlier();
 
   std::filesystem::path file_;
   double every_;
+  mapping::MapOptions options_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  View newest_;              // since the last save
-  View last_;                // of the map as it is
-  std::vector<View> ended_;  // maps that ended, to be saved
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the map as it is
+  View newest_;                                       // since the last save
+  View last_;                                         // of the map as it is
+  std::vector<Picture> ended_;                        // maps that ended, to be saved
   bool kept_earlier_ = false;
   bool over_ = false;
   SaverReport report_;

@@ -180,16 +180,21 @@ void Session::run(const std::function<bool()>& stop) {
     counts_.dropped += dropped - dropped_before;
     dropped_before = dropped;
   };
+  Time last_frame;  // that came
   while (!stop() && !(newest.ended() && waiting.empty())) {
+    constexpr double kNothingComes = 0.25;  // s
     parts_.progress.mapper = now_of_ours().nanoseconds;
     if (auto frame = newest.take(std::chrono::milliseconds(waiting.empty() ? 20 : 2))) {
+      last_frame = frame->time;
       if (waiting.size() == kMostWaiting) {
         thin_out(waiting, frame->time);
         ++counts_.dropped;
       }
       waiting.push_back(std::move(*frame));
     }
-    map_next(waiting, in_ours(now_of_ours(), -parts_.camera.behind()));
+    const Time now = in_ours(now_of_ours(), -parts_.camera.behind());
+    map_next(waiting, now);
+    if (waiting.empty() && seconds_between(last_frame, now) > kNothingComes) forget(now);
     count();
   }
   camera.end();
@@ -260,6 +265,7 @@ bool Session::map_next(std::vector<LiveFrame>& waiting, Time now) {
     busy_ = busy_ > 0 ? 0.7 * busy_ + 0.3 * took : took;
   } else {
     skip(answer.kind == PoseAnswer::Kind::never ? std::string(answer.why) : "no pose in time");
+    forget(frame.time);
     pass(frame);
   }
   waiting.erase(waiting.begin());
@@ -268,6 +274,18 @@ bool Session::map_next(std::vector<LiveFrame>& waiting, Time now) {
 
 void Session::pass(const LiveFrame& frame) {
   for (Sink* const sink : parts_.sinks) sink->pass(frame);
+}
+
+/// What nobody has seen again for so long as MapOptions::forget_after says, where no frame is mapped.
+void Session::forget(Time now) {
+  if (!view_) return;
+  tell_forgotten(mapper_.forget(now));
+}
+
+void Session::tell_forgotten(const mapping::MapChange& change) {
+  if (!view_ || change.touched.empty()) return;
+  view_ = view_->after(mapper_.map(), change);
+  for (Sink* const sink : parts_.sinks) sink->forget(view_, change);
 }
 
 /// What comes does not belong to what was there. False if that cannot be.
@@ -292,10 +310,8 @@ void Session::map_frame(const LiveFrame& frame, const Pose& T_world_body) {
     parts_.recorder->take({frame.image, frame.time, T_world_camera, covariance});
   const MapperUpdate& update = mapper_.add(frame.image, frame.time, T_world_camera, covariance);
   if (update.outcome == MapperUpdate::Outcome::skipped) {
-    if (view_ && !update.change.touched.empty()) {
-      view_ = view_->after(mapper_.map(), update.change);  // what it forgot
-      for (Sink* const sink : parts_.sinks) sink->forget(view_, update.change);
-    }
+    tell_forgotten(update.change);
+    forget(frame.time);
     skip(update.reason.substr(0, update.reason.find_first_of("0123456789")));  // one count for each kind
     pass(frame);
     return;

@@ -134,6 +134,8 @@ class Session {
   void map_frame(const LiveFrame& frame, const Pose& T_world_body);
   void skip(const std::string& reason);
   void pass(const LiveFrame& frame);
+  void forget(Time now);
+  void tell_forgotten(const mapping::MapChange& change);
   bool begin_anew();
 
   SessionParts parts_;

@@ -103,6 +103,52 @@ TEST_P(MapFile, ReadsBackToTheSameSpaceAndTheSameBytes) {
   EXPECT_EQ(io::bytes_of(encode_map(*map, format())), content);
 }
 
+/// A .bt says free or occupied and no more: that is what is read from it, whatever the thresholds are.
+TEST_P(MapFile, ReadsBackToTheSameSpaceWithAnyThreshold) {
+  struct Limits {
+    double clamp_min, threshold, clamp_max;
+  };
+  for (const Limits& limits : {Limits{0.03, 0.1, 0.9}, Limits{0.12, 0.35, 0.97}, Limits{0.12, 0.98, 0.99}}) {
+    mapping::MapOptions options;
+    options.clamp_min = limits.clamp_min;
+    options.occupancy_threshold = limits.threshold;
+    options.clamp_max = limits.clamp_max;
+    auto tree = std::make_unique<octomap::OcTree>(0.1);
+    tree->setClampingThresMin(limits.clamp_min);
+    tree->setClampingThresMax(limits.clamp_max);
+    const auto log_odds = [](double p) { return static_cast<float>(std::log(p / (1 - p))); };
+    for (int i = 0; i < 200; ++i) {
+      const double p = limits.clamp_min + (limits.clamp_max - limits.clamp_min) * i / 199;
+      tree->setNodeValue(0.1 * i, 0.05, 0.05, log_odds(p));
+    }
+    const auto map = OccupancyMap::create(options, std::move(tree));
+    ASSERT_TRUE(map.ok()) << map.error().message;
+    ASSERT_GT(map->counts().occupied, 0U);
+    ASSERT_GT(map->counts().free, 0U);
+    const auto expect_same = [&](const std::string& bytes, const char* of) {
+      const auto back = decode_map(bytes, "map", options);
+      ASSERT_TRUE(back.ok()) << back.error().message;
+      for (int i = -1; i < 201; ++i) {
+        const Vector3d place(0.1 * i + 0.05, 0.05, 0.05);
+        ASSERT_EQ(back->at(place), map->at(place)) << of << ' ' << limits.threshold << ' ' << i;
+      }
+    };
+    expect_same(io::bytes_of(encode_map(*map, format())), "map");
+    // The log-odds of a view are coarse; which side of the threshold they are on is not.
+    const auto view = mapping::MapView::of(*map);
+    expect_same(io::bytes_of(encode_map(*view, format())), "view");
+  }
+}
+
+/// OctoMap makes a free cube of a node that has nothing below it, however large.
+TEST(MapFileNodes, AnInnerNodeWithoutChildrenIsRefused) {
+  const std::string header = "# Octomap OcTree binary file\nid OcTree\nsize 2\nres 0.1\ndata\n";
+  const auto map = decode_map(header + std::string("\0\xc0\0\0", 4), "map.bt");
+  ASSERT_FALSE(map.ok());
+  EXPECT_NE(map.error().message.find("map.bt: an inner node has no child"), std::string::npos)
+      << map.error().message;
+}
+
 /// What a live session saves meanwhile, from the picture that others may read.
 TEST_P(MapFile, OfAViewIsThatOfItsMap) {
   std::vector<OccupancyMap> maps;

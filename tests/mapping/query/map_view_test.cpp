@@ -15,6 +15,8 @@
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 
+#include "pade/mapping/tiles/voxel_code.hpp"
+
 #include "mapping/flown_map.hpp"
 #include "mapping/query/random_map.hpp"
 
@@ -118,6 +120,52 @@ TEST(MapView, AfterEachFrameIsWhatItWouldBeMadeAnewAndTheOldOneStays) {
   for (const auto& [old, states] : kept) {
     for (std::size_t i = 0; i < points.size(); ++i) ASSERT_EQ(old->at(points[i]), states[i]);
   }
+}
+
+/// A threshold at or below the probability of a miss makes obstacles of all that is seen free: odd, but map
+/// and view must not say different things of one voxel.
+TEST(MapView, AgreesWithItsMapWhateverTheThreshold) {
+  const auto flight = simulation::make_analytic_flight("forward", 4, simulation::analytic_camera(96, 72));
+  for (const double threshold : {0.2, 0.35, 0.5, 0.65, 0.9}) {
+    MapOptions options;
+    options.occupancy_threshold = threshold;
+    OccupancyMap map = std::move(OccupancyMap::create(options)).value();
+    auto view = MapView::of(map);
+    for (std::size_t k = 0; k < flight->times.size(); ++k)
+      view = view->after(
+          map, map.integrate(depth_image(*flight, k, 0.02), flight->camera, flight->T_world_camera[k]));
+    std::size_t cells = 0;
+    map.for_each([&](const MapCell& cell, Occupancy state) {
+      const Vector3d inside = cell.centre.cast<double>().array() + 0.01;
+      ASSERT_EQ(view->at(inside), state) << threshold << ": " << inside.transpose();
+      ASSERT_EQ(map.at(inside), state) << threshold << ": " << inside.transpose();
+      ++cells;
+    });
+    EXPECT_GT(cells, 500U) << threshold;
+  }
+}
+
+/// What is saved of a view says of each place what the view says, in few cubes where much is the same.
+TEST(MapView, ItsLeavesAreTheMapInAsFewCubes) {
+  const OccupancyMap map = random_map(7);
+  const auto view = MapView::of(map);
+  std::size_t ours = 0, theirs = 0;
+  std::uint64_t end = 0;
+  view->for_each_leaf([&](const MapLeaf& leaf) {
+    ASSERT_GE(leaf.code, end) << "in order, disjoint";
+    end = leaf.code + voxels_of(leaf.depth);
+    ++ours;
+    for (const std::uint64_t code : {leaf.code, end - 1}) {
+      const Vector3d place = centre_of(morton_key(code), map.options().voxel);
+      ASSERT_EQ(map.at(place), leaf.is_occupied ? Occupancy::occupied : Occupancy::free);
+    }
+  });
+  map.for_each_leaf([&](const MapLeaf&) { ++theirs; });
+  EXPECT_LE(ours, theirs);
+  const OccupancyMap::Counts counts = map.counts();
+  std::size_t voxels = 0;
+  view->for_each_leaf([&](const MapLeaf& leaf) { voxels += voxels_of(leaf.depth); });
+  EXPECT_EQ(voxels, counts.occupied + counts.free);
 }
 
 TEST(MapView, KnowsNothingOutsideItsWindow) {
