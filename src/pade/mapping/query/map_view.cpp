@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -42,13 +43,6 @@ void count(const TileTree& tiles, const VoxelIndex& v, Contents& contents, int& 
   highest = std::max<int>(highest, tile.log_odds[index_in_tile(v)]);
 }
 
-/// A tile that knows anything, or a larger cube of tiles that are all the same.
-struct PlacedTile {
-  std::uint64_t code;  // of its first voxel
-  unsigned depth;      // of the cube in the octree
-  const Tile* tile;
-};
-
 bool knows_anything(const Tile& tile) {
   return std::any_of(tile.words.begin(), tile.words.end(),
                      [](const Tile::Word& word) { return word.known != 0; });
@@ -61,38 +55,67 @@ bool is_uniform(const Tile& tile) {
                      [&](const Tile::Word& word) { return word.occupied == occupied; });
 }
 
-/// Leaves of one tile: as few as say the same.
-class TileLeaves {
+/// The leaves of a tree of tiles, in Morton order and as few as say the same.
+class Leaves {
  public:
-  TileLeaves(const TileTree& tiles, const std::function<void(const MapLeaf&)>& visitor)
+  Leaves(const TileTree& tiles, const std::function<void(const MapLeaf&)>& visitor)
       : tiles_(tiles), visitor_(visitor) {}
 
-  void visit(const PlacedTile& placed) {
-    if (is_uniform(*placed.tile))
-      return say(placed.code, placed.depth, placed.tile->at(0, 0, 0), placed.tile->log_odds[0]);
-    for (std::size_t i = 0; i < kVoxels; ++i) {
-      const VoxelKey v = morton_key(i);
-      states_[i] = placed.tile->at(v[0], v[1], v[2]);
-      values_[i] = placed.tile->log_odds[i];
-    }
-    for (std::size_t eighth = 0; eighth < kVoxels; eighth += 64) {
-      if (are_same(eighth, 64)) {
-        say(placed.code + eighth, kTileDepth + 1, states_[eighth], values_[eighth]);
-        continue;
-      }
-      for (std::size_t i = eighth; i < eighth + 64; i += 8) {
-        if (are_same(i, 8)) {
-          say(placed.code + i, kTileDepth + 2, states_[i], values_[i]);
-          continue;
-        }
-        for (std::size_t k = i; k < i + 8; ++k) say(placed.code + k, kTreeDepth, states_[k], values_[k]);
-      }
-    }
-  }
+  void visit() { walk(*tiles_.world, 0, 0); }
 
  private:
   static constexpr std::size_t kVoxels = 512;
 
+  /// The tile that all of it is, unknown or uniform; null if there is none.
+  static const Tile* one_tile(const Tile& tile) {
+    return is_uniform(tile) || !knows_anything(tile) ? &tile : nullptr;
+  }
+  template <class Node>
+  static const Tile* one_tile(const Node& node) {
+    const auto& first = node.children.front();
+    for (const auto& child : node.children)
+      if (child != first) return nullptr;
+    return one_tile(*first);
+  }
+
+  /// @param code   Morton code of its first voxel
+  /// @param depth  in the octree
+  template <class Part>
+  void walk(const Part& part, std::uint64_t code, unsigned depth) {
+    if (const Tile* const tile = one_tile(part))
+      return say(code, depth, tile->at(0, 0, 0), tile->log_odds[0]);
+    if constexpr (std::is_same_v<Part, Tile>) {
+      walk_tile(part, code);
+    } else {
+      const unsigned below = depth + Part::kBits;
+      for (std::uint64_t i = 0; i < part.children.size(); ++i) {
+        const VoxelKey at = morton_key(i);
+        const std::size_t slot =
+            at[0] | std::size_t{at[1]} << Part::kBits | std::size_t{at[2]} << (2 * Part::kBits);
+        walk(*part.children[slot], code + (i << bits_below(below)), below);
+      }
+    }
+  }
+  void walk_tile(const Tile& tile, std::uint64_t code) {
+    for (std::size_t i = 0; i < kVoxels; ++i) {
+      const VoxelKey v = morton_key(i);
+      states_[i] = tile.at(v[0], v[1], v[2]);
+      values_[i] = tile.log_odds[i];
+    }
+    for (std::size_t eighth = 0; eighth < kVoxels; eighth += 64) {
+      if (are_same(eighth, 64)) {
+        say(code + eighth, kTileDepth + 1, states_[eighth], values_[eighth]);
+        continue;
+      }
+      for (std::size_t i = eighth; i < eighth + 64; i += 8) {
+        if (are_same(i, 8)) {
+          say(code + i, kTileDepth + 2, states_[i], values_[i]);
+          continue;
+        }
+        for (std::size_t k = i; k < i + 8; ++k) say(code + k, kTreeDepth, states_[k], values_[k]);
+      }
+    }
+  }
   [[nodiscard]] bool are_same(std::size_t from, std::size_t count) const {
     for (std::size_t i = from + 1; i < from + count; ++i)
       if (states_[i] != states_[from] || values_[i] != values_[from]) return false;
@@ -226,40 +249,7 @@ Contents MapView::in_ball(const Vector3d& centre, double radius) const {
 }
 
 void MapView::for_each_leaf(const std::function<void(const MapLeaf&)>& visitor) const {
-  const TileBounds& bounds = tiles_->bounds;
-  std::vector<PlacedTile> known;
-  constexpr int kSide = 1 << TileGroup::kBits;  // tiles of a group
-  const auto group_of = [](int tile) { return tile / kSide; };
-  const TileGroup* nothing = nullptr;  // all groups of which nothing is known are one
-  for (int z = group_of(bounds.first[2]); z <= group_of(bounds.last[2]); ++z)
-    for (int y = group_of(bounds.first[1]); y <= group_of(bounds.last[1]); ++y)
-      for (int x = group_of(bounds.first[0]); x <= group_of(bounds.last[0]); ++x) {
-        const TileGroup& group = tiles_->group(x, y, z);
-        if (&group == nothing) continue;
-        const auto code_of = [&](unsigned i) {
-          const auto key = [](int of_group, unsigned inside) {
-            return static_cast<std::uint16_t>((of_group * kSide + static_cast<int>(inside & 7U)) * kTileSide);
-          };
-          return morton_code({key(x, i), key(y, i >> 3U), key(z, i >> 6U)});
-        };
-        const Tile* const first = group.children[0].get();
-        const bool is_one = std::all_of(group.children.begin(), group.children.end(),
-                                        [&](const auto& child) { return child.get() == first; });
-        if (is_one && is_uniform(*first)) {
-          known.push_back({code_of(0), kTileDepth - TileGroup::kBits, first});
-          continue;
-        }
-        const std::size_t before = known.size();
-        for (unsigned i = 0; i < group.children.size(); ++i) {
-          if (knows_anything(*group.children[i]))
-            known.push_back({code_of(i), kTileDepth, group.children[i].get()});
-        }
-        if (known.size() == before) nothing = &group;
-      }
-  std::sort(known.begin(), known.end(),
-            [](const PlacedTile& a, const PlacedTile& b) { return a.code < b.code; });
-  TileLeaves leaves(*tiles_, visitor);
-  for (const PlacedTile& tile : known) leaves.visit(tile);
+  Leaves(*tiles_, visitor).visit();
 }
 
 }  // namespace pade::mapping
