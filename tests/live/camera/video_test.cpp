@@ -1,6 +1,5 @@
 // Video files and streams that another program has made.
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
