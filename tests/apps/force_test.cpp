@@ -90,11 +90,17 @@ TEST_F(ForceOn, WhatTheCommandWroteReplacesItUnlessSomethingWasAdded) {
     ASSERT_EQ(shell(kPade + command).code, 0) << command;
     EXPECT_EQ(shell(kPade + command).code, 1) << command;
     EXPECT_EQ(shell(kPade + command + " --force").code, 0) << command;
-    std::ofstream(folder_ / "own" / "notes.txt") << "Tree at 12 m.\n";
-    const Outcome outcome = shell(kPade + command + " --force");
-    EXPECT_EQ(outcome.code, 1) << command;
-    EXPECT_THAT(outcome.text, HasSubstr("notes.txt"));
-    EXPECT_TRUE(fs::exists(folder_ / "own" / "notes.txt"));
+    // Also by names that the command itself writes, where there is something to be written.
+    for (const char* const added : {"notes.txt", "mask.png", "gnss.csv", "rgb/notes.txt", "rgb/more/1.png"}) {
+      const fs::path file = folder_ / "own" / added;
+      fs::create_directories(file.parent_path());
+      std::ofstream(file) << "Tree at 12 m.\n";
+      const Outcome outcome = shell(kPade + command + " --force");
+      EXPECT_EQ(outcome.code, 1) << command << " " << added;
+      EXPECT_THAT(outcome.text, HasSubstr("found " + std::string(added).substr(0, 8)));
+      EXPECT_TRUE(fs::exists(file));
+      fs::remove(file);
+    }
     fs::remove_all(at("own"));
     fs::create_directory(at("own"));
     EXPECT_EQ(shell(kPade + command + " --force").code, 0) << "an empty folder";

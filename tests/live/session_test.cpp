@@ -165,6 +165,19 @@ TEST(Session, MapsTheWallAhead) {
   EXPECT_TRUE(bed.session->map().bounds().max().y() > 2.5);
 }
 
+TEST(Session, SaysWhyNoImageComesWhileNoneDoes) {
+  Bed bed(10);
+  std::string before, meanwhile;
+  bed.run(2.2, [&](double elapsed) {
+    bed.camera.stalled = elapsed > 0.6 && elapsed < 1.6;
+    if (elapsed < 0.8) before += bed.progress.no_image.get();
+    if (elapsed < 1.5) meanwhile = bed.progress.no_image.get();
+  });
+  EXPECT_EQ(before, "");
+  EXPECT_EQ(meanwhile, "somebody stands before it");
+  EXPECT_EQ(bed.progress.no_image.get(), "");
+}
+
 /// A source of poses that knows how good its motions are is believed; else the options are.
 TEST(Session, TheMotionIsAsGoodAsItsSourceSays) {
   for (const bool known : {true, false}) {

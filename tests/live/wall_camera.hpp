@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <string>
 #include <thread>
 
 #include <opencv2/imgproc.hpp>
@@ -64,6 +65,7 @@ class WallCamera : public FrameSource {
   [[nodiscard]] const Camera& camera() const override { return camera_; }
   [[nodiscard]] cv::Mat mask() const override { return {}; }
   [[nodiscard]] double behind() const override { return lag; }
+  [[nodiscard]] std::string remark() const override { return stalled ? "somebody stands before it" : ""; }
 
   std::atomic<bool> stalled{false};
   std::atomic<double> lag{0};  ///< of its times behind ours, s

@@ -328,6 +328,17 @@ TEST_F(MapFromSensors, NamesWhatIsMissing) {
   }
   std::ofstream(broken / "camera.yaml") << without.str();
   EXPECT_THAT(refusal(broken), HasSubstr("T_body_camera"));
+  // Before the clocks are looked at, which takes minutes.
+  MapSequenceOptions searched = options(poses_from_sensors);
+  searched.time_offset = "auto";
+  int looked_at = 0;
+  const auto sequence = open_sequence(broken, searched, {}, [&](std::size_t, std::size_t) {
+    ++looked_at;
+    return true;
+  });
+  ASSERT_FALSE(sequence);
+  EXPECT_THAT(sequence.error().message, HasSubstr("T_body_camera is missing"));
+  EXPECT_EQ(looked_at, 0);
   const fs::path silent = copy("silent");
   cut_after(silent / "gnss.csv", 0.3);
   cut_after(silent / "mag.csv", -1);
@@ -411,6 +422,17 @@ TEST_F(MapFromSensors, TheOffsetIsFoundOrRefused) {
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr("expected"));
   EXPECT_THAT(refused.error().message, HasSubstr("the IMU at 0.0 deg/s"));
+  EXPECT_THAT(refused.error().message, testing::Not(HasSubstr("were not compared")));
+
+  // Images that come more slowly than they are compared.
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(images / "rgb")) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (std::size_t i = 0; i < files.size(); ++i)
+    if (i % 8 != 0) fs::remove(files[i]);
+  const auto slow = open_sequence(images, searched);
+  ASSERT_FALSE(slow);
+  EXPECT_THAT(slow.error().message, HasSubstr("8 pairs lie more than 0.5 s apart and were not compared"));
 }
 
 }  // namespace

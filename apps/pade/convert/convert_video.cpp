@@ -34,7 +34,8 @@ Result<Camera> copy_calibration(const VideoConversion& conversion, const io::Out
   if (!calibration) return calibration.error();
   const auto text = io::read_file(conversion.calibration);
   if (!text) return text.error();
-  const std::string head = fmt::format("{} convert: of {}\n", kFlightWords, conversion.in);
+  const std::string head = fmt::format("{} convert: of {}\n{} rgb {}\n", kFlightWords, conversion.in,
+                                       io::flight_files_line, kFlightMarker);
   if (const Status status = folder.write(kFlightMarker, head + *text); !status) return status.error();
   const auto place = folder.place(kFlightMarker);
   if (!place) return place.error();

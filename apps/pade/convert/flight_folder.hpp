@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string_view>
 
+#include "pade/io/recording/flight/flight_writer.hpp"
+
 #include "options/own_folder.hpp"
 
 namespace pade::cli {
@@ -16,7 +18,7 @@ inline constexpr std::array<std::string_view, 8> kFlightFiles = {
 
 /// Whether --force may replace the folder.
 inline Status check_own_flight(const std::filesystem::path& folder) {
-  return check_own(folder, {kFlightMarker, kFlightWords, kFlightFiles});
+  return check_own(folder, {kFlightMarker, kFlightWords, kFlightFiles, io::flight_files_line});
 }
 
 }  // namespace pade::cli

@@ -231,13 +231,14 @@ struct LiveViews {
     if (topics) topics->take_counts(counts);
   }
   /// For the log.
-  [[nodiscard]] std::vector<std::string> texts(const live::DdsParts* dds) const {
+  [[nodiscard]] std::vector<std::string> texts(const live::Progress& progress,
+                                               const live::DdsParts* dds) const {
     std::vector<std::string> texts;
     if (web) texts.push_back(web->text());
     if (topics) texts.push_back(fmt::format("dds: {}", topics->text()));
-    if (dds == nullptr) return texts;
-    if (const std::string why = dds->shared.no_image.get(); !why.empty())
-      texts.push_back(fmt::format("camera: {}", why));
+    std::string why = progress.no_image.get();
+    if (why.empty() && dds != nullptr) why = dds->shared.no_image.get();
+    if (!why.empty()) texts.push_back(fmt::format("camera: {}", why));
     return texts;
   }
   Time last{};
@@ -371,7 +372,8 @@ Status run_live(const LiveArguments& arguments) {
     const Time start = live::now_of_ours();
     session->run([&] {
       const std::string stamps = live::stamp_text(session->stamp_offset());
-      log.maybe(progress, parts->link->report(), *session, [&] { return views->texts(parts->dds.get()); });
+      log.maybe(progress, parts->link->report(), *session,
+                [&] { return views->texts(progress, parts->dds.get()); });
       stamps_said.set(stamps);
       views->maybe(session->counts());
       pulse.maybe(*parts->link);
@@ -388,7 +390,7 @@ Status run_live(const LiveArguments& arguments) {
   text += summary(session->counts(), parts->link->report());
   if (const std::string stamps = live::stamp_text(session->stamp_offset()); !stamps.empty())
     text += stamps + "\n";
-  for (const std::string& view : views->texts(parts->dds.get())) text += view + "\n";
+  for (const std::string& view : views->texts(progress, parts->dds.get())) text += view + "\n";
   if (recorder != nullptr) text += recorded(*recorder);
   (void)std::fputs(text.c_str(), stdout);
   return saved;

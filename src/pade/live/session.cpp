@@ -162,11 +162,20 @@ void Session::run(const std::function<bool()>& stop) {
   NewestFrame newest;
   CameraThread camera([&](const std::atomic<bool>& over) {
     constexpr int kPatience = 50;  // ms
+    Time heard = now_of_ours();    // a frame, or why none comes
     while (!over) {
       LiveFrame frame;
       const FrameSource::Outcome outcome = parts_.camera.next(frame, kPatience);
       if (outcome == FrameSource::Outcome::ended) break;
-      if (outcome == FrameSource::Outcome::nothing) continue;
+      const Time now = now_of_ours();
+      if (outcome == FrameSource::Outcome::nothing) {
+        if (seconds_between(heard, now) < kStale) continue;
+        parts_.progress.no_image.set(parts_.camera.remark());
+        heard = now;
+        continue;
+      }
+      heard = now;
+      parts_.progress.no_image.set({});
       parts_.progress.image = in_ours(frame.time, parts_.camera.behind()).nanoseconds;
       newest.put(std::move(frame));
     }

@@ -389,6 +389,9 @@ Result<io::Sequence> open_sequence(const std::filesystem::path& folder, const Ma
   const auto images = open_images(folder, options.sequence);
   if (!images) return images.error();
   if (searched) {
+    // Before the search, which takes minutes.
+    const Status mounted = check_mounting(images->folder(), images->calibration());
+    if (!mounted) return mounted.error();
     if (Status status = find_offset(*images, progress, source); !status) return status.error();
   }
   if (!fed)

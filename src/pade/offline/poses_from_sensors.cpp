@@ -156,17 +156,20 @@ std::vector<std::string> notes_on(const CameraTrajectory& trajectory) {
   return notes;
 }
 
+Status check_mounting(const std::filesystem::path& folder, const io::Calibration& calibration) {
+  if (calibration.T_body_camera) return {};
+  return Error{
+      fmt::format("{}: field T_body_camera is missing in the calibration, expected it because the poses "
+                  "come from the "
+                  "body's sensors (pade calibrate mounting finds its rotation)",
+                  folder.string())};
+}
+
 io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options, const SensorSource& source,
                                    const FedImages* images) {
   return [options, source, images](const std::filesystem::path& folder, const std::vector<Time>& times,
                                    const io::Calibration& calibration) -> Result<io::ComputedPoses> {
-    if (!calibration.T_body_camera) {
-      return Error{
-          fmt::format("{}: field T_body_camera is missing in the calibration, expected it because the poses "
-                      "come from the "
-                      "body's sensors (pade calibrate mounting finds its rotation)",
-                      folder.string())};
-    }
+    if (const Status mounted = check_mounting(folder, calibration); !mounted) return mounted.error();
     const bool apart = !source.log.empty();
     if (apart && !source.time_offset && !calibration.time_offset_s) {
       return Error{

@@ -60,9 +60,12 @@ struct SensorSource {
   std::string found;                  ///< how the offset was found, one sentence; empty: it was given
 };
 
-/// The same as a source of poses for io::Sequence, with a note on the clocks where there is anything to say.
-/// Errors: those of the functions above; no GNSS data; a calibration without T_body_camera; a log apart from
-/// the images without a stated offset, or that does not overlap with them.
+/// Refuses a calibration without T_body_camera. @param folder  of the images, in the message
+Status check_mounting(const std::filesystem::path& folder, const io::Calibration& calibration);
+
+/// camera_trajectory_of() as a source of poses for io::Sequence, with a note on the clocks where there is
+/// anything to say. Errors: those of the functions above; no GNSS data; a calibration without T_body_camera;
+/// a log apart from the images without a stated offset, or that does not overlap with them.
 /// @param images  null: none is fed back
 io::PoseSource poses_from_imu_gnss(const navigation::NavigatorOptions& options,
                                    const SensorSource& source = {}, const FedImages* images = nullptr);

@@ -109,6 +109,25 @@ TEST(ImageCodec, PartsThatAJpegLacksAreNotMadeUp) {
   }
 }
 
+/// What a library would say of it on the terminal: a camera whose every frame is such would fill the pipe of
+/// a log that nobody reads, and stop there.
+TEST(ImageCodec, HarmlessFaultsAreNotSaid) {
+  FileBytes jpeg = encode_jpeg(test::picture(32, 24, 3));
+  jpeg.insert(jpeg.end() - 2, 40, 0);  // before the marker of the end
+  FileBytes png = encode_png(test::picture(32, 24, 3));
+  FileBytes chunk = {0, 0, 0, 1, 'b', 'K', 'G', 'D', 7};  // a background of one byte, where six are expected
+  const std::uint32_t sum = crc32(&chunk[4], 5);
+  for (const unsigned shift : {24U, 16U, 8U, 0U}) chunk.push_back(static_cast<std::uint8_t>(sum >> shift));
+  constexpr std::ptrdiff_t kHead = 33;  // signature and IHDR
+  png.insert(png.begin() + kHead, chunk.begin(), chunk.end());
+  for (const FileBytes& bytes : {jpeg, png}) {
+    testing::internal::CaptureStderr();
+    const auto image = decode_image(bytes, Pixels::colour);
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    EXPECT_TRUE(image) << image.error().message;
+  }
+}
+
 TEST(ImageCodec, TagsThatLieAreNoOrientation) {
   const FileBytes good = test::orientation_tags(6, true);
   EXPECT_EQ(exif_orientation(good), 6);

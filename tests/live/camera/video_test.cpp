@@ -1,6 +1,5 @@
 // Video files and streams that another program has made.
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -21,7 +20,6 @@
 
 #include "pade/io/image/image_codec.hpp"
 #include "pade/live/camera/folder_source.hpp"
-#include "pade/live/camera/video_clock.hpp"
 #include "pade/live/camera/video_source.hpp"
 
 #include "support/temporary_folder.hpp"
@@ -37,10 +35,10 @@ using ::testing::HasSubstr;
 constexpr int kWidth = 160, kHeight = 96;
 constexpr double kRate = 25;
 
-Camera video_camera() {
+Camera video_camera(int width = kWidth, int height = kHeight) {
   Camera camera;
-  camera.width = kWidth;
-  camera.height = kHeight;
+  camera.width = width;
+  camera.height = height;
   camera.fx = camera.fy = 100;
   camera.cx = 79.5;
   camera.cy = 47.5;
@@ -101,6 +99,15 @@ class VideoTest : public ::testing::Test {
       EXPECT_GE(seconds_between(frame.time, now_of_ours()), 0);
     }
   }
+  /// Options in, file out.
+  void make(const std::string& options, const fs::path& file) const {
+    const std::string command = fmt::format("ffmpeg -loglevel error -y {} '{}'", options, file.string());
+    ASSERT_TRUE(runs(command)) << command;
+  }
+  [[nodiscard]] static std::string refusal(const fs::path& file) {
+    const auto source = open_video(file.string(), video_camera());
+    return source ? std::string("opened") : source.error().message;
+  }
   test::TemporaryFolder folder_;
 };
 
@@ -131,6 +138,73 @@ TEST_F(VideoTest, FramesAtUnevenTimesKeepThem) {
   const auto frames = played(**source);
   ASSERT_EQ(frames.size(), 7U);
   for (const auto& [number, time] : frames) EXPECT_NEAR(time, number / kRate, 1.1e-3) << number;
+}
+
+/// White pictures, whose rows are no multiple of what swscale writes at once.
+TEST_F(VideoTest, EveryColumnOfAFrameIsWritten) {
+  for (const int width : {100, 98, 102, 854, 1366}) {
+    for (const std::string codec :
+         {"mpeg4 -pix_fmt yuv420p", "mjpeg -pix_fmt yuvj422p", "ffv1 -pix_fmt gray"}) {
+      SCOPED_TRACE(fmt::format("{} {}", width, codec));
+      const fs::path file = folder_ / "white.mkv";
+      make(fmt::format("-f lavfi -i color=white:s={}x66:r=25:d=0.12 -c:v {}", width, codec), file);
+      const auto source = open_video(file.string(), video_camera(width, 66));
+      ASSERT_TRUE(source) << source.error().message;
+      LiveFrame frame;
+      ASSERT_EQ((*source)->next(frame, 500), FrameSource::Outcome::frame);
+      double least = 0;
+      cv::minMaxLoc(frame.image.reshape(1), &least);
+      EXPECT_GT(least, 240);
+    }
+  }
+}
+
+/// The oracle is ffmpeg, which turns pictures as players do.
+TEST_F(VideoTest, PicturesThatAreToBeTurnedAre) {
+  make("-f lavfi -i testsrc=s=160x96:r=25:d=0.12 -c:v mpeg4 -q:v 1", folder_ / "plain.mp4");
+  for (const int angle : {0, 90, 180, 270}) {
+    SCOPED_TRACE(angle);
+    const fs::path file = folder_ / "turned.mp4";
+    make(fmt::format("-i '{}' -c copy -metadata:s:v:0 rotate={}", (folder_ / "plain.mp4").string(), angle),
+         file);
+    make(fmt::format("-i '{}' -frames:v 1", file.string()), folder_ / "oracle.png");
+    const auto oracle = io::load_image((folder_ / "oracle.png").string(), io::Pixels::colour);
+    ASSERT_TRUE(oracle) << oracle.error().message;
+    const bool upended = angle % 180 != 0;
+    ASSERT_EQ(oracle->size(), upended ? cv::Size(kHeight, kWidth) : cv::Size(kWidth, kHeight));
+    const auto source = open_video(file.string(), video_camera(oracle->cols, oracle->rows));
+    ASSERT_TRUE(source) << source.error().message;
+    LiveFrame frame;
+    ASSERT_EQ((*source)->next(frame, 500), FrameSource::Outcome::frame);
+    EXPECT_LT(cv::norm(frame.image, *oracle, cv::NORM_L1) / static_cast<double>(3 * oracle->total()), 3);
+  }
+  // By 45 degrees: the numbers of the matrix have 16 bits behind the point.
+  const auto words = [](const std::vector<std::uint32_t>& numbers) {
+    std::string bytes;
+    for (const std::uint32_t number : numbers)
+      for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes += static_cast<char>(number >> shift & 0xFFU);
+    return bytes;
+  };
+  std::ifstream in(folder_ / "turned.mp4", std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  const auto at = bytes.find(words({0, 0x00010000, 0, 0xFFFF0000, 0}));
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 20, words({0xB505, 0xB505, 0, 0xFFFF4AFB, 0xB505}));
+  std::ofstream(folder_ / "aslant.mp4", std::ios::binary) << bytes;
+  EXPECT_THAT(refusal(folder_ / "aslant.mp4"), HasSubstr("turned by 45 degrees, expected a multiple of 90"));
+}
+
+TEST_F(VideoTest, StampsAreNotMadeUp) {
+  const fs::path file = video("flight.mjpeg", 10, "-c:v mjpeg -q:v 2");
+  EXPECT_THAT(refusal(file),
+              testing::AllOf(HasSubstr("has no stamps"), HasSubstr("ffmpeg -framerate RATE -i IN")));
+  // What the message advises.
+  make(fmt::format("-framerate 10 -i '{}' -c copy", file.string()), folder_ / "flight.mkv");
+  const auto source = open_video((folder_ / "flight.mkv").string(), video_camera());
+  ASSERT_TRUE(source) << source.error().message;
+  const auto frames = played(**source);
+  ASSERT_EQ(frames.size(), 10U);
+  for (const auto& [number, time] : frames) EXPECT_NEAR(time, 0.1 * number, 1.1e-3) << number;
 }
 
 TEST_F(VideoTest, WhatIsNoVideoOfTheCameraIsRefused) {
@@ -204,18 +278,26 @@ TEST_F(VideoTest, BecomesAFolderOfImages) {
     EXPECT_EQ(number_of(*read), i);
   }
   EXPECT_FALSE(convert(lens));
+  const std::vector<std::string> others = {"groundtruth.txt", "mask.png", "imu.csv", "rgb/notes.txt"};
+  for (const std::string& other : others) {
+    std::ofstream(folder_ / "out" / other) << "somebody's\n";
+    EXPECT_FALSE(convert(lens + " --force")) << other;
+    EXPECT_THAT(said(), HasSubstr(other));
+    EXPECT_TRUE(fs::remove(folder_ / "out" / other)) << other;
+  }
   EXPECT_TRUE(convert(lens + " --force")) << said();
   EXPECT_TRUE(fs::exists(folder_ / "out" / "rgb" / "0.000000.png"));
 }
 
-/// Sends a file in real time to whoever connects, once.
+/// Sends a file at so many times its pace to whoever connects, once.
 class Sender {
  public:
-  Sender(const fs::path& file, int port) {
+  Sender(const fs::path& file, int port, const std::string& format = "mpegts",
+         const std::string& pace = "1") {
     const std::string name = file.string();
     const std::string address = fmt::format("tcp://127.0.0.1:{}?listen=1", port);
-    std::vector<std::string> words = {"ffmpeg", "-loglevel", "quiet", "-re",    "-i",   name,
-                                      "-c",     "copy",      "-f",    "mpegts", address};
+    std::vector<std::string> words = {"ffmpeg", "-loglevel", "quiet", "-readrate", pace,   "-i",
+                                      name,     "-c",        "copy",  "-f",        format, address};
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
@@ -271,47 +353,62 @@ TEST_F(VideoTest, AStreamComesInItsOwnTimeAndComesBack) {
   EXPECT_NE((*source)->remark(), "");
 }
 
+/// Of a format that has no stamps; FFmpeg would make them up at 25 Hz, and it is 10 Hz.
+TEST_F(VideoTest, AStreamWithoutStampsHasTheTimesOfItsArrival) {
+  constexpr int kPort = 24'753;
+  const fs::path file = video("stream.avi", 100, "-c:v mjpeg -q:v 2");
+  const auto source = open_video(fmt::format("tcp://127.0.0.1:{}", kPort), video_camera());
+  ASSERT_TRUE(source) << source.error().message;
+  const Sender sender(file, kPort, "mpjpeg", "0.4");
+  std::vector<std::pair<int, Time>> frames;
+  const Time start = now_of_ours();
+  LiveFrame frame;
+  while (frames.size() < 15 && seconds_between(start, now_of_ours()) < 30)
+    if ((*source)->next(frame, 50) == FrameSource::Outcome::frame)
+      frames.emplace_back(number_of(frame.image), frame.time);
+  ASSERT_EQ(frames.size(), 15U) << (*source)->remark();
+  const int steps = frames.back().first - frames.front().first;
+  EXPECT_NEAR(seconds_between(frames.front().second, frames.back().second), 0.1 * steps, 0.2);
+}
+
+TEST_F(VideoTest, AStreamSaysWhyNoFrameComes) {
+  constexpr int kPort = 24'755;
+  if (!runs("ffmpeg -hide_banner -encoders 2> /dev/null | grep -q libx264")) GTEST_SKIP() << "no libx264";
+  // H.264 alone, without a container, says no times.
+  const fs::path file = video("stream.mkv", 250, "-c:v libx264 -g 5 -bf 0 -pix_fmt yuv420p");
+  const auto source = open_video(fmt::format("tcp://127.0.0.1:{}", kPort), video_camera());
+  ASSERT_TRUE(source) << source.error().message;
+  const Sender sender(file, kPort, "h264");
+  const Time start = now_of_ours();
+  LiveFrame frame;
+  std::string remark;
+  while (remark.find("damaged or have no stamp") == std::string::npos &&
+         seconds_between(start, now_of_ours()) < 15) {
+    EXPECT_EQ((*source)->next(frame, 50), FrameSource::Outcome::nothing);
+    remark = (*source)->remark();
+  }
+  EXPECT_EQ(remark, "its frames are damaged or have no stamp");
+}
+
+/// Nobody sends: the running session says it, as --check does.
+TEST_F(VideoTest, ARunningSessionSaysWhyNoFrameComes) {
+  std::ofstream(folder_ / "lens.yaml")
+      << "width: 160\nheight: 96\nfx: 100\nfy: 100\ncx: 79.5\ncy: 47.5\ndistortion_model: none\n";
+  std::ofstream(folder_ / "live.yaml") << fmt::format(
+      "camera: {{kind: video, path: \"tcp://127.0.0.1:24757\", calibration: {}}}\n"
+      "link: {{port: \"udp:24758\"}}\n",
+      (folder_ / "lens.yaml").string());
+  const fs::path said = folder_ / "said";
+  runs(fmt::format("{} live '{}' --for 1.5 > '{}' 2>&1", PADE_PROGRAM, (folder_ / "live.yaml").string(),
+                   said.string()));
+  std::ifstream in(said);
+  EXPECT_THAT(std::string((std::istreambuf_iterator<char>(in)), {}), HasSubstr("camera: Connection refused"));
+}
+
 TEST(Video, AddressesAreStreams) {
   EXPECT_TRUE(is_stream("rtsp://192.168.0.10/main"));
   EXPECT_FALSE(is_stream("/home/me/flight.mp4"));
   EXPECT_FALSE(is_stream("a:b.mp4"));
-}
-
-/// Delays of 40 ms and an exponential jitter of 15 ms: the stamps are late by the least delay, to within the
-/// jitter's share, and evenly spaced.
-TEST(VideoClock, TheLeastDelayIsTheClock) {
-  for (const double drift : {-5e-5, 0.0, 5e-5}) {
-    std::mt19937 random(3);
-    std::exponential_distribution<double> jitter(1 / 0.015);
-    VideoClock clock;
-    int given = 0;
-    double worst = 0;
-    for (int i = 0; i < 60 * 25; ++i) {
-      const double exposure = 1e6 + i / 25.0;
-      const double arrived = exposure + 0.04 + jitter(random);
-      const auto time = clock.time_of(i / 25.0 * (1 + drift) + 77, Time::from_seconds(arrived));
-      if (!time) continue;
-      ++given;
-      EXPECT_LE(time->seconds(), arrived + 1e-6);
-      if (i > 250) worst = std::max(worst, std::abs(time->seconds() - exposure - 0.04));
-    }
-    EXPECT_GE(given, 60 * 25 - 27);
-    EXPECT_LT(worst, 0.006) << drift;
-  }
-}
-
-TEST(VideoClock, AStampThatJumpsBeginsAnew) {
-  VideoClock clock;
-  const auto at = [&](double stamp, double arrived) {
-    return clock.time_of(stamp, Time::from_seconds(arrived));
-  };
-  for (int i = 0; i < 50; ++i) at(i / 25.0, 100 + i / 25.0);
-  ASSERT_TRUE(at(2, 102));
-  EXPECT_FALSE(at(500, 102.04));
-  for (int i = 1; i < 30; ++i) at(500 + i / 25.0, 102.04 + i / 25.0);
-  const auto time = at(501.2, 103.24);
-  ASSERT_TRUE(time);
-  EXPECT_NEAR(time->seconds(), 103.24, 1e-3);
 }
 
 }  // namespace

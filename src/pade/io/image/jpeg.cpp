@@ -22,11 +22,9 @@ struct JpegTalk {
   std::array<char, JMSG_LENGTH_MAX> text{};  ///< of what made the picture useless
   bool corrupt = false;                      ///< parts of the picture are made up
   bool ended = false;                        ///< the bytes ended before the end-of-image marker
-  void (*say)(j_common_ptr, int) = nullptr;  ///< libjpeg's own way, to the terminal
 
   JpegTalk() {
     jpeg_std_error(&manager);
-    say = manager.emit_message;
     manager.error_exit = give_up;
     manager.emit_message = note;
   }
@@ -51,8 +49,7 @@ struct JpegTalk {
         if (!talk.corrupt) talk.manager.format_message(codec, talk.text.data());
         talk.corrupt = true;
         break;
-      default:
-        talk.say(codec, level);
+      default:  // harmless; to the terminal, as libjpeg would, a camera could say it with each frame
         break;
     }
   }

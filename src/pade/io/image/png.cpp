@@ -25,6 +25,9 @@ struct PngComplaint {
   png_longjmp(png, 1);
 }
 
+/// Harmless; to the terminal, as libpng would, a camera could say it with each frame.
+void png_warns(png_structp /*png*/, png_const_charp /*text*/) {}
+
 /// False where libpng gave up, which leaves `steps` by a jump: they call libpng, and own nothing.
 template <class Steps>
 bool png_carried_out(png_structp png, const Steps& steps) {
@@ -36,7 +39,7 @@ bool png_carried_out(png_structp png, const Steps& steps) {
 class PngFile {
  public:
   explicit PngFile(ImageBytes bytes) : left_(bytes) {
-    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &complaint_, png_gives_up, nullptr);
+    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &complaint_, png_gives_up, png_warns);
     if (png_ == nullptr) return;
     head_ = png_create_info_struct(png_);
     tail_ = png_create_info_struct(png_);
@@ -174,7 +177,7 @@ std::vector<std::uint8_t> encode_png(const cv::Mat& image, const PngPacking& pac
   constexpr int kStrategyRuns = 3;  // Z_RLE
   PngComplaint complaint;
   PngOutput output;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &complaint, png_gives_up, nullptr);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &complaint, png_gives_up, png_warns);
   png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
   const bool written =
       info != nullptr && png_carried_out(png, [&] {

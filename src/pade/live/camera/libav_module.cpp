@@ -3,13 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
+#include <cstring>
 #include <exception>
+#include <optional>
+#include <string_view>
 
 #include "pade/live/camera/video_module.hpp"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libavutil/display.h>
 #include <libavutil/imgutils.h>
 #include <libswscale/swscale.h>
 }
@@ -26,6 +31,45 @@ std::string text_of(int failure) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
   ::av_strerror(failure, text.data(), text.size());
   return text.data();
+}
+
+/// Whether the format's frames have stamps of their own. Of others FFmpeg makes them up, at 25 Hz.
+bool has_stamps(const AVInputFormat& format) {
+  const std::string_view name = format.name;
+  return (format.flags & AVFMT_NOTIMESTAMPS) == 0 && !name.starts_with("image2") && !name.ends_with("_pipe");
+}
+
+/// How a picture has to be turned to be shown: first rows and columns exchanged, then mirrored.
+struct Turn {
+  bool transposed = false, left_right = false, upside_down = false;
+};
+
+/// By a display matrix, as ffmpeg and players read it, to within a degree. Empty: by no multiple of 90
+/// degrees.
+std::optional<Turn> turn_of(const std::int32_t* matrix) {
+  const double angle = ::av_display_rotation_get(matrix);
+  if (std::isnan(angle)) return Turn{};  // none, to ffmpeg too
+  const double quarters = std::round(angle / 90);
+  if (std::abs(angle - 90 * quarters) >= 1) return std::nullopt;
+  // x' = a x + c y, y' = b x + d y
+  const std::int32_t a = matrix[0], b = matrix[1], c = matrix[3], d = matrix[4];
+  if (std::fmod(quarters, 2) == 0) return Turn{false, a < 0, d < 0};
+  return Turn{true, c < 0, b < 0};
+}
+
+cv::Mat turned(cv::Mat image, const Turn& turn) {
+  constexpr int kBoth = -1, kUpsideDown = 0, kLeftRight = 1;
+  if (turn.transposed) {
+    cv::Mat other;
+    cv::transpose(image, other);
+    image = other;
+  }
+  if (turn.left_right || turn.upside_down) {
+    cv::Mat other;
+    cv::flip(image, other, !turn.left_right ? kUpsideDown : turn.upside_down ? kBoth : kLeftRight);
+    image = other;
+  }
+  return image;
 }
 
 class LibavVideo : public Video {
@@ -58,6 +102,12 @@ class LibavVideo : public Video {
     const int opened = ::avformat_open_input(&input_, address.c_str(), nullptr, &options);
     ::av_dict_free(&options);
     if (opened < 0) return fail(reason(opened));
+    stamped_ = has_stamps(*input_->iformat);
+    if (!stamped_ && !place_.stream)
+      return fail(
+          "its format (" + std::string(input_->iformat->name) +
+          ") has no stamps, and FFmpeg would make them up; `ffmpeg -framerate RATE -i IN -c copy OUT.mkv` "
+          "writes it with those of a rate");
     if (const int found = ::avformat_find_stream_info(input_, nullptr); found < 0) return fail(reason(found));
     const AVCodec* codec = nullptr;
     stream_ = ::av_find_best_stream(input_, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
@@ -65,6 +115,9 @@ class LibavVideo : public Video {
     decoder_ = ::avcodec_alloc_context3(codec);
     if (decoder_ == nullptr) return fail("no memory");
     const AVStream& stream = *input_->streams[stream_];
+    std::size_t size = 0;
+    const std::uint8_t* const matrix = ::av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &size);
+    if (matrix != nullptr && !read_turn(matrix, size, turn_of_all_)) return false;
     if (::avcodec_parameters_to_context(decoder_, stream.codecpar) < 0) return fail("no memory");
     decoder_->thread_count = 1;  // frames would wait for one another, and the mapper has the other cores
     if (place_.stream) decoder_->flags |= AV_CODEC_FLAG_LOW_DELAY;
@@ -77,7 +130,7 @@ class LibavVideo : public Video {
     wait_from_now(place_.patience);
     while (true) {
       const int got = ::avcodec_receive_frame(decoder_, frame_);
-      if (got == 0) return take(frame) ? Read::frame : Read::unusable;
+      if (got == 0) return taken(frame);
       if (got == AVERROR_EOF) return Read::ended;
       if (got != AVERROR(EAGAIN)) return Read::unusable;
       const int read = ::av_read_frame(input_, packet_);
@@ -120,14 +173,41 @@ class LibavVideo : public Video {
     return failure == AVERROR_EXIT ? "nothing came in time" : text_of(failure);
   }
 
-  bool take(VideoFrame& out) {
+  /// False: it is of no use here, and why() says it.
+  bool read_turn(const std::uint8_t* bytes, std::size_t size, Turn& turn) {
+    std::array<std::int32_t, 9> matrix{};
+    if (size < sizeof(matrix)) return true;
+    std::memcpy(matrix.data(), bytes, sizeof(matrix));
+    const auto known = turn_of(matrix.data());
+    if (!known)
+      return fail("its pictures are to be shown turned by " +
+                  std::to_string(std::lround(-::av_display_rotation_get(matrix.data()))) +
+                  " degrees, expected a multiple of 90");
+    turn = *known;
+    return true;
+  }
+
+  Read taken(VideoFrame& out) {
+    try {
+      return take(out);
+    } catch (const std::exception&) {  // no memory
+      ::av_frame_unref(frame_);
+      return Read::unusable;
+    }
+  }
+  Read take(VideoFrame& out) {
     const bool damaged = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
     const std::int64_t stamp = frame_->best_effort_timestamp;
-    const bool good = !damaged && stamp != AV_NOPTS_VALUE && convert(out.image);
-    out.seconds = static_cast<double>(stamp) * tick_;
     out.arrived = {frame_->reordered_opaque};
+    out.seconds = stamped_ ? static_cast<double>(stamp) * tick_ : out.arrived.seconds();
+    Turn turn = turn_of_all_;
+    const AVFrameSideData* const own = ::av_frame_get_side_data(frame_, AV_FRAME_DATA_DISPLAYMATRIX);
+    const bool known = own == nullptr || read_turn(own->data, own->size, turn);
+    const bool good = known && !damaged && (!stamped_ || stamp != AV_NOPTS_VALUE) && convert(out.image);
+    if (good) out.image = turned(out.image, turn);
     ::av_frame_unref(frame_);
-    return good;
+    if (!known) return Read::failed;
+    return good ? Read::frame : Read::unusable;
   }
 
   bool convert(cv::Mat& image) {
@@ -142,15 +222,16 @@ class LibavVideo : public Video {
                                      grey ? AV_PIX_FMT_GRAY8 : AV_PIX_FMT_BGR24, SWS_BILINEAR, nullptr,
                                      nullptr, nullptr);
     if (scaler_ == nullptr) return false;
-    try {
-      image = cv::Mat(height, width, grey ? CV_8UC1 : CV_8UC3);
-    } catch (const std::exception&) {
+    // swscale writes a row in groups of pixels, and leaves the last one out where the row has no room for it.
+    constexpr int kGroup = 32;
+    const int wide = (width + kGroup - 1) / kGroup * kGroup;
+    cv::Mat whole(height, wide, grey ? CV_8UC1 : CV_8UC3);
+    std::array<std::uint8_t*, 4> rows{whole.data, nullptr, nullptr, nullptr};
+    const std::array<int, 4> steps{static_cast<int>(whole.step), 0, 0, 0};
+    if (::sws_scale(scaler_, frame_->data, frame_->linesize, 0, height, rows.data(), steps.data()) != height)
       return false;
-    }
-    std::array<std::uint8_t*, 4> rows{image.data, nullptr, nullptr, nullptr};
-    const std::array<int, 4> steps{static_cast<int>(image.step), 0, 0, 0};
-    return ::sws_scale(scaler_, frame_->data, frame_->linesize, 0, height, rows.data(), steps.data()) ==
-           height;
+    image = wide == width ? whole : whole.colRange(0, width).clone();
+    return true;
   }
 
   VideoPlace place_;
@@ -160,6 +241,8 @@ class LibavVideo : public Video {
   AVFrame* frame_ = nullptr;
   SwsContext* scaler_ = nullptr;
   int stream_ = -1;
+  bool stamped_ = true;
+  Turn turn_of_all_;
   double tick_ = 0;  // s
   Time deadline_;
   std::string why_;

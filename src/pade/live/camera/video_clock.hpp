@@ -12,18 +12,23 @@ namespace pade::live {
 /// A stream's stamps are those of its sender; what is known is when each frame arrived. No frame arrives
 /// before it was sent, so the least delay so far is nearest to the truth: what it is itself (encoding and the
 /// way: tens of milliseconds to some hundred) cannot be seen from here and remains in the stamps. A clock
-/// that runs slower by up to 100 ppm is followed at that rate.
+/// that runs slower by up to 100 ppm is followed at that rate. Frames that a congested network holds up, for
+/// however long, keep their times.
 class VideoClock {
  public:
   /// The time of a frame by our clock, later than its exposure by the least delay. Empty in the first half
-  /// second of a stream, in which what had piled up at the sender arrives; a stamp that is more than a second
-  /// off what the ones before promise begins anew.
+  /// second of a stream, in which what had piled up at the sender arrives. Where the sender's clock was set
+  /// it begins anew: a stamp is not later than the one before, or its frame comes more than a second sooner
+  /// than the least delay allows. One that comes late is late, and no more: its stamp follows on the one
+  /// before.
   std::optional<Time> time_of(double seconds, Time arrived) {
     const double at = arrived.seconds() - origin(arrived);
     const double delay = at - seconds;
     constexpr double kJump = 1, kSettling = 0.5, kDrift = 1e-4;  // s, s, s/s
     const double allowed = least_ + kDrift * (at - last_);
-    if (!begun_ || std::abs(delay - allowed) > kJump) {
+    const bool set_back = seconds <= stamp_, set_forward = delay < allowed - kJump;
+    stamp_ = seconds;
+    if (!begun_ || set_back || set_forward) {
       begun_ = true;
       start_ = at;
       least_ = delay;
@@ -47,7 +52,7 @@ class VideoClock {
 
   std::optional<double> zero_;
   bool begun_ = false;
-  double start_ = 0, last_ = 0, least_ = 0;
+  double start_ = 0, last_ = 0, least_ = 0, stamp_ = 0;
 };
 
 }  // namespace pade::live

@@ -14,9 +14,10 @@ namespace pade::live {
 
 /// An image of a video.
 struct VideoFrame {
-  cv::Mat image;       ///< CV_8UC1 or CV_8UC3 (BGR), its own
-  double seconds = 0;  ///< when it is to be shown, by the video's own clock
-  Time arrived;        ///< its last byte, by our clock
+  cv::Mat image;  ///< CV_8UC1 or CV_8UC3 (BGR), its own, turned as the video says
+  double seconds =
+      0;         ///< when it is to be shown, by the video's own clock; of a stream without one: `arrived`
+  Time arrived;  ///< its last byte, by our clock
 };
 
 /// A file or a stream while it is open. None of its functions throws.
@@ -27,7 +28,7 @@ class Video {
     frame,     ///< here it is
     unusable,  ///< one came that is damaged or has no stamp
     ended,     ///< none will come any more
-    failed,    ///< nothing came in time, or the connection is gone: why() says which
+    failed,    ///< nothing came in time, the connection is gone, or a turn that none can make: see why()
   };
   Video() = default;
   Video(const Video&) = delete;

@@ -130,12 +130,16 @@ class VideoStreamSource : public FrameSource {
         [](const void* self) { return static_cast<const VideoStreamSource*>(self)->over_.load(); }, this};
     const auto video = library_.open(place, why);
     if (video == nullptr) return say(why);
+    say("no frame has come yet");
     VideoClock clock;
     VideoFrame frame;
     while (!over_) {
       const Video::Read read = video->next(frame);
       if (read == Video::Read::ended || read == Video::Read::failed) return say(video->why());
-      if (read != Video::Read::frame) continue;
+      if (read != Video::Read::frame) {
+        say("its frames are damaged or have no stamp");
+        continue;
+      }
       if (const Status size = check_size("it", frame.image, calibrated_); !size) {
         say(size.error().message);
         continue;
@@ -183,6 +187,7 @@ Result<std::unique_ptr<FrameSource>> open_video_file(const VideoModule& library,
   VideoFrame first;
   Video::Read read = Video::Read::unusable;
   while (read == Video::Read::unusable) read = video->next(first);
+  if (read == Video::Read::failed) return Error{fmt::format("{}: {}", name, video->why())};
   if (read != Video::Read::frame)
     return Error{
         fmt::format("{}: found no frame that can be decoded and has a stamp, expected a video", name)};

@@ -21,11 +21,13 @@ bool is_stream(const std::string& name);
 /// Opens a video in the size of its calibration. A file is played at its real pace: the first frame comes at
 /// once, its stamp is that moment of our clock. A stream (RTSP, over TCP where the sender can, and what else
 /// FFmpeg opens by such an address) has the stamps of its sender, laid into our clock by the least delay
-/// (VideoClock): they are late by that delay, which session.time_offset is for. Of frames that wait the
-/// newest two are kept. A stream that ends, or is silent for a second, is opened again twice a second, and
+/// (VideoClock): they are late by that delay, which session.time_offset is for; where its format has no
+/// stamps (motion JPEG over HTTP) each frame has the time at which it arrived. Of frames that wait the newest
+/// two are kept. A stream that ends, or is silent for a second, is opened again twice a second, and
 /// the frames of its first half second are left out; so are frames that are damaged, have no stamp, or
-/// another size. Errors: no such file, nothing in it that can be decoded, another size, or no module for
-/// videos; a stream that is not there yet is waited for.
+/// another size. Errors: no such file, nothing in it that can be decoded, no stamps in its format, another
+/// size, pictures to be turned by no multiple of 90 degrees, or no module for videos; a stream that is not
+/// there yet is waited for.
 /// @param camera  as calibrated, with its distortion; images are undistorted
 Result<std::unique_ptr<FrameSource>> open_video(const std::string& name, const Camera& camera);
 

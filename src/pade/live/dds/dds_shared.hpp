@@ -4,11 +4,11 @@
 
 #include <mutex>
 #include <string>
-#include <utility>
 
 #include "pade/io/recording/flight/flight_names.hpp"
 #include "pade/live/dds/dds_options.hpp"
 #include "pade/live/dds/message_clock.hpp"
+#include "pade/live/shared_text.hpp"
 
 namespace pade::live {
 
@@ -44,23 +44,6 @@ class FrameNames {
   }
   mutable std::mutex mutex_;
   Frames frames_;
-};
-
-/// A text that changes. Any thread.
-class SharedText {
- public:
-  void set(std::string text) {
-    const std::lock_guard lock(mutex_);
-    text_ = std::move(text);
-  }
-  [[nodiscard]] std::string get() const {
-    const std::lock_guard lock(mutex_);
-    return text_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::string text_;
 };
 
 /// Of one session. Any thread.

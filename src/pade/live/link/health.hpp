@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "pade/core/time.hpp"
+#include "pade/live/shared_text.hpp"
 
 namespace pade::live {
 
@@ -14,6 +15,7 @@ struct Progress {
   std::atomic<std::int64_t> image{0};   ///< start of exposure of the newest that came
   std::atomic<std::int64_t> mapper{0};  ///< the mapper's thread has gone round
   std::atomic<std::int64_t> depth{0};   ///< exposure of the newest frame that gave depth
+  SharedText no_image;                  ///< why none comes, where the camera knows it; else empty
 };
 
 /// The first input that is missing.

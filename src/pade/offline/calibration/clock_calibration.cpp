@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -26,13 +27,14 @@ Result<io::ComputedPoses> poses_of_nobody(const std::filesystem::path& /*folder*
   return none;
 }
 
+constexpr double kLongestStep = 0.5;  // s
+
 /// The longest time between two images whose turn is compared, s.
 double longest_step(const io::Sequence& images) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < images.size(); ++i)
     steps.push_back(seconds_between(images.time(i - 1), images.time(i)));
-  constexpr double kLongest = 0.5;  // s
-  return std::min(kLongest, 3.5 * median(steps, kLongest));
+  return std::min(kLongestStep, 3.5 * median(steps, kLongestStep));
 }
 
 struct SeenTurns {
@@ -98,19 +100,24 @@ Result<ClockCalibration> calibrate_clock(const io::Sequence& images, const std::
   const GyroTrack gyro(imu);
   std::optional<Eigen::Quaterniond> believed;
   if (images.calibration().T_body_camera) believed = images.calibration().T_body_camera->rotation;
-  const auto refused = [&](const Error& error, const TurnTally& t) {
-    return Error{fmt::format(
+  const auto refused = [&](const Error& error, const SeenTurns& seen) {
+    const TurnTally& t = seen.tally;
+    std::string text = fmt::format(
         "{}: {} (of {} pairs of images {} told a turn beside a motion and {} without parallax, {} had too "
         "few pixels "
-        "that tell one, {} fitted no single motion)",
-        images.folder().string(), error.message, t.pairs, t.moving, t.still, t.blank, t.contradicted)};
+        "that tell one, {} fitted no single motion",
+        images.folder().string(), error.message, t.pairs, t.moving, t.still, t.blank, t.contradicted);
+    if (seen.gaps > 0)
+      text += fmt::format("; {} pairs lie more than {:.2g} s apart and were not compared", seen.gaps,
+                          longest_step(images));
+    return Error{text + ")"};
   };
   // First what the images alone say, then, with the gyroscope's word on where to look, again.
   auto first =
       turns_of(images, {}, [&](std::size_t done) { return !progress || progress(done, 2 * images.size()); });
   if (!first) return first.error();
   auto known = align_turns(first->turns, gyro, believed);
-  if (!known) return refused(known.error(), first->tally);
+  if (!known) return refused(known.error(), *first);
   for (int pass = 2;; ++pass) {
     const auto expected = [&](Time from, Time to) { return expected_turn(*known, gyro, from, to); };
     auto seen = turns_of(images, expected, [&](std::size_t done) {
@@ -118,7 +125,7 @@ Result<ClockCalibration> calibrate_clock(const io::Sequence& images, const std::
     });
     if (!seen) return seen.error();
     auto fine = realign_turns(seen->turns, gyro, *known);
-    if (!fine) return refused(fine.error(), seen->tally);
+    if (!fine) return refused(fine.error(), *seen);
     const double moved = difference_of(*known, *fine, gyro, seen->turns);
     known = std::move(fine);
     constexpr double kSettled = 0.001;  // rad: the images are looked at from as good as there

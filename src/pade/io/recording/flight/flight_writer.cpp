@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include <GeographicLib/LocalCartesian.hpp>
@@ -325,13 +326,15 @@ class FlightWriter {
   WrittenFlight written_;
 };
 
-std::string camera_yaml(const Sequence& sequence) {
+/// @param files  of the flight, separated by blanks
+std::string camera_yaml(const Sequence& sequence, std::string_view files) {
   const Camera& camera = sequence.raw_camera();
   const Calibration& calibration = sequence.calibration();
   std::string text = fmt::format(
-      "# written by pade {}\nwidth: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\ndistortion_model: {}\n",
-      version, camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
-      lens_name(camera.distortion));
+      "# written by pade {}\n{}{}\nwidth: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\n"
+      "distortion_model: {}\n",
+      version, flight_files_line, files, camera.width, camera.height, camera.fx, camera.fy, camera.cx,
+      camera.cy, lens_name(camera.distortion));
   if (camera.distortion != Distortion::none) {
     const std::size_t count = camera.distortion == Distortion::plumb_bob     ? 5
                               : camera.distortion == Distortion::equidistant ? 4
@@ -404,6 +407,18 @@ Status write_tables(const NavigationLog& log, const OutputFolder& folder) {
   return folder.write("mag.csv", text);
 }
 
+/// Of what a flight may have, what is there by now, each behind a blank.
+Result<std::string> files_written(const OutputFolder& folder) {
+  std::string files;
+  for (const char* const name :
+       {"rgb", "groundtruth.txt", "mask.png", "imu.csv", "gnss.csv", "mag.csv", "baro.csv"}) {
+    const auto place = folder.place(name);
+    if (!place) return place.error();
+    if (path_exists(*place)) files += fmt::format(" {}", name);
+  }
+  return files;
+}
+
 /// mask.png as it is, or of a mask that a recording states.
 Status write_mask(const Sequence& sequence, const OutputFolder& folder, WrittenFlight& written) {
   if (!sequence.mask_is_stated()) return {};
@@ -454,7 +469,6 @@ Result<WrittenFlight> write_flight(const Sequence& sequence, const NavigationLog
   std::vector<StampedPose> rows = sequence.trajectory().rows();
   for (StampedPose& row : rows) row.time = pose_time(sequence, row.time);
   written.poses = rows.size();
-  if (Status status = folder.write("camera.yaml", camera_yaml(sequence)); !status) return status.error();
   if (Status status = folder.write("groundtruth.txt", format_trajectory(rows)); !status)
     return status.error();
   if (log != nullptr) {
@@ -466,6 +480,10 @@ Result<WrittenFlight> write_flight(const Sequence& sequence, const NavigationLog
     if (const auto T_body_imu = imu_on_body(sequence)) turn_into_body(sensors, *T_body_imu, written);
     if (Status status = write_tables(sensors, folder); !status) return status.error();
   }
+  const auto files = files_written(folder);
+  if (!files) return files.error();
+  const std::string calibration = camera_yaml(sequence, *files + " camera.yaml");
+  if (Status status = folder.write("camera.yaml", calibration); !status) return status.error();
   return written;
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pade/core/result.hpp"
@@ -32,6 +33,10 @@ using FlightProgress = std::function<bool(std::size_t done)>;
 /// 2038); the file cannot be written.
 Result<WrittenFlight> write_flight(const Sequence& sequence, const NavigationLog* log,
                                    RecordingWriter& writer, const FlightProgress& progress = {});
+
+/// What the line of camera.yaml begins with that names the files and folders of a flight that was written,
+/// so that what somebody added later is known.
+inline constexpr std::string_view flight_files_line = "# files:";
 
 /// The same as a folder in the TUM layout (docs/sequences.md), with the sensors in the axes of the body of
 /// the poses, and without the covariances of motions.
