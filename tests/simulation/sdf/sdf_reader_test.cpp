@@ -94,7 +94,7 @@ TEST_F(SdfReader, ReadsACameraAsItIsMounted) {
   EXPECT_LT((camera.T_body_camera.translation - Eigen::Vector3d(0.1, 0, 0.05)).norm(), 1e-12);
 }
 
-TEST(SdfReader, OfACameraSaysWhatThePictureDoesNotShow) {
+TEST_F(SdfReader, OfACameraSaysWhatThePictureDoesNotShow) {
   const auto read = [](const std::string& image, const std::string& rest) {
     return read_sdf(world(model(kBox) +
                           "<model name='q'><link name='l'><sensor name='c' type='camera'><camera>"
