@@ -80,6 +80,8 @@ Result<Scene> load_scene(const fs::path& file, const SimulateArguments& argument
 Status render(const Scene& scene, Flight flight, const fs::path& out, const SimulateArguments& arguments,
               const SequenceOptions& options, const std::string& label) {
   if (arguments.colour) flight.image.colour = flight.states_colour = true;
+  if (const auto inexact = precision_warning(flight))
+    fmt::print(stderr, "pade simulate: warning: {}\n", *inexact);
   std::optional<Progress> line;
   int known = 0;
   return write_sequence(scene, flight, out, options, [&](int done, int total) {
@@ -184,7 +186,7 @@ Status simulate_open_world(const SimulateArguments& arguments) {
     if (const Status s = keep_world(world.files, arguments); !s) return s;
   }
   fmt::print("{}: world {} of seed {}, from ({}, {}, {}) to ({}, {}, {}) m\n",
-             arguments.write_world.empty() ? cached.string() : arguments.write_world, made->attempt + 1,
+             arguments.write_world.empty() ? made->file.string() : arguments.write_world, made->attempt + 1,
              arguments.seed, made->start.x(), made->start.y(), made->start.z(), made->goal.x(),
              made->goal.y(), made->goal.z());
   if (arguments.out.empty()) return {};

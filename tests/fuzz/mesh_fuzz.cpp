@@ -31,7 +31,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       .write(reinterpret_cast<const char*>(data) + 1, static_cast<std::streamsize>(size) - 1);
   const simulation::SubMesh part{data[0] % 2 == 1 ? "part" : "", data[0] % 5 == 0};
   std::vector<std::string> warnings;
-  const auto parts = simulation::read_mesh(file, part, {}, warnings);
+  simulation::TextureImages images;
+  const auto parts = simulation::read_mesh(file, part, {}, images, warnings);
   if (!parts) {
     PADE_EXPECT(parts.error().message.starts_with(folder.string()));
     return 0;

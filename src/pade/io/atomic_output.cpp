@@ -247,27 +247,31 @@ Status OutputFolder::write(const fs::path& relative, std::span<const unsigned ch
 }
 
 Status OutputFolder::commit() {
+  if (Status status = put_in_place(temporary_, target_, overwrite_); !status) return status;
+  temporary_.clear();
+  created_parents_.clear();
+  return {};
+}
+
+Status put_in_place(const fs::path& finished, const fs::path& target, Overwrite overwrite) {
   std::error_code code;
-  const bool exists = fs::exists(target_, code);
-  if (exists && overwrite_ == Overwrite::refuse && !fs::is_empty(target_, code)) {
-    return Error{fmt::format("{}: the folder was made by somebody else meanwhile", target_.string())};
+  const bool exists = fs::exists(target, code);
+  if (exists && overwrite == Overwrite::refuse && !fs::is_empty(target, code)) {
+    return Error{fmt::format("{}: the folder was made by somebody else meanwhile", target.string())};
   }
-  if (exists && ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) == 0) {
-    created_parents_.clear();
-    discard();  // the temporary name now holds the old folder
+  if (exists && ::renameat2(AT_FDCWD, finished.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) {
+    fs::remove_all(finished, code);  // that name now holds the old folder
     return {};
   }
   // File systems without an atomic exchange: the old folder steps aside and comes back if the rename fails.
-  const fs::path aside = temporary_beside(target_);
-  if (exists) fs::rename(target_, aside, code);
-  if (!code) fs::rename(temporary_, target_, code);
+  const fs::path aside = temporary_beside(target);
+  if (exists) fs::rename(target, aside, code);
+  if (!code) fs::rename(finished, target, code);
   if (code) {
-    const Error error = os_error(target_, "cannot be put in place", code.value());
-    if (exists && !fs::exists(target_, code)) fs::rename(aside, target_, code);
+    const Error error = os_error(target, "cannot be put in place", code.value());
+    if (exists && !fs::exists(target, code)) fs::rename(aside, target, code);
     return error;
   }
-  temporary_.clear();
-  created_parents_.clear();
   if (exists) fs::remove_all(aside, code);
   return {};
 }

@@ -82,6 +82,12 @@ class OutputFolder {
   Overwrite overwrite_ = Overwrite::refuse;
 };
 
+/// Moves a finished folder to its place, in one step if the file system can, and removes what it replaces.
+/// With Overwrite::refuse a place that was taken meanwhile is an error. Where it fails, both folders stay
+/// where they were.
+Status put_in_place(const std::filesystem::path& finished, const std::filesystem::path& target,
+                    Overwrite overwrite);
+
 /// Writes a single file beside its place and renames it. `path` may be a device such as /dev/stdout, which is
 /// written to directly.
 Status write_file(const std::filesystem::path& path, std::string_view content, Overwrite overwrite);

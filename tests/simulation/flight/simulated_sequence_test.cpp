@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <sstream>
 #include <string>
@@ -165,6 +166,28 @@ TEST_F(SimulatedSequence, RefusesWhatCannotBeFlownOrWritten) {
   fs::create_directories(folder_ / "precious");
   std::ofstream(folder_ / "precious/letter.txt") << "dear";
   EXPECT_THAT(write("precious", short_flight(), force), HasSubstr("not replaced"));
+  Flight unready = short_flight();
+  unready.first_frame = 0;
+  unready.exposure_time = 0.02;
+  EXPECT_THAT(write("c", unready),
+              testing::AllOf(HasSubstr("first_frame_s"), HasSubstr("at least half the exposure, 0.01 s")));
+  Flight far = short_flight();
+  for (Waypoint& w : far.waypoints) w.position.y() += 5e6;
+  EXPECT_THAT(write("c", far), HasSubstr("from the origin of the world"));
+  EXPECT_TRUE(precision_warning(far).has_value());
+  EXPECT_FALSE(precision_warning(short_flight()).has_value());
+}
+
+TEST_F(SimulatedSequence, IsPutInPlaceWhereverItsNameLeads) {
+  ASSERT_EQ(write("whole", short_flight()), "");
+  SequenceOptions force;
+  force.overwrite = io::Overwrite::replace;
+  fs::create_directories(folder_ / "in/here");
+  for (const char* name : {"in/here/.", "in/here/", "in/here/../here", "in/./here/."}) {
+    ASSERT_EQ(write(name, short_flight(), force), "") << name;
+    EXPECT_EQ(contents(folder_ / "in/here"), contents(folder_ / "whole")) << name;
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "in"), fs::directory_iterator()), 1) << name;
+  }
 }
 
 /// Grey levels by which frame 2, warped onto frame 1 with the true flow, differs from frame 1 where both see
@@ -318,6 +341,55 @@ TEST(FlightFile, LeavesColourAndNoiseToTheWorldWhereItStatesNone) {
   world.cameras[0].noise_deviation.reset();
   EXPECT_FALSE(image("", world).colour) << "its format is not stated either";
   EXPECT_EQ(image("", world).read_noise, ImageOptions{}.read_noise);
+}
+
+TEST(FlightFile, LeavesToTheWorldsCameraWhatItDoesNotState) {
+  const std::string points = "waypoints: [{position: [0, 0, 2]}, {position: [5, 0, 2]}]\n";
+  World world;
+  CameraSensor sensor;
+  sensor.camera.width = 1280;
+  sensor.camera.height = 800;
+  sensor.camera.fx = sensor.camera.fy = 900;
+  sensor.camera.cx = 650;
+  sensor.camera.cy = 390;
+  sensor.camera.distortion = Distortion::plumb_bob;
+  sensor.camera.coefficients[0] = 0.1;
+  sensor.T_body_camera = {Eigen::Quaterniond(forward_camera_rotation()), {0.2, 0.1, -0.3}};
+  world.cameras.push_back(sensor);
+  const auto camera_of = [&](const std::string& text, const World& of) {
+    const auto flight = parse_flight(points + text, "f.yaml");
+    EXPECT_TRUE(flight) << flight.error().message;
+    return flight_camera(*flight, of);
+  };
+  const FlightCamera tilted = camera_of("camera: {pitch_down_deg: 20}\n", world);
+  EXPECT_EQ(tilted.camera.width, 1280);
+  EXPECT_EQ(tilted.camera.fx, 900);
+  EXPECT_EQ(tilted.camera.distortion, Distortion::plumb_bob);
+  EXPECT_EQ(tilted.T_body_camera.translation, sensor.T_body_camera.translation);
+  EXPECT_NEAR((tilted.T_body_camera.rotation * Eigen::Vector3d::UnitZ()).z(),
+              -std::sin(20 * 3.14159265 / 180), 1e-6);
+  // Half the size shows the same: where the edges of the picture are seen does not change.
+  const Camera half = camera_of("camera: {width: 640, height: 400}\n", world).camera;
+  for (const double edge : {-0.5, 1279.5})
+    EXPECT_NEAR((0.5 * (edge + 0.5) - 0.5 - half.cx) / half.fx, (edge - 650) / 900, 1e-12);
+  for (const double edge : {-0.5, 799.5})
+    EXPECT_NEAR((0.5 * (edge + 0.5) - 0.5 - half.cy) / half.fy, (edge - 390) / 900, 1e-12);
+  EXPECT_EQ(half.coefficients[0], 0.1);
+  EXPECT_EQ(camera_of("camera: {fx: 300, distortion_model: none}\n", world).camera.distortion,
+            Distortion::none);
+  EXPECT_EQ(camera_of("camera: {fx: 300}\n", world).camera.fy, 300);
+  // Without a camera of the world the defaults count, whatever is stated.
+  const FlightCamera alone = camera_of("camera: {width: 320, pitch_down_deg: 20}\n", World{});
+  EXPECT_EQ(alone.camera.fx, 554.26);
+  EXPECT_EQ(alone.camera.height, 480);
+  EXPECT_EQ(alone.camera.cx, 159.5);
+  // The pitch turns the camera where it is.
+  const FlightCamera mounted = camera_of(
+      "camera: {pitch_down_deg: 90, T_body_camera: [[0,0,1,0.5],[-1,0,0,0],[0,-1,0,0.25],[0,0,0,1]]}\n",
+      World{});
+  EXPECT_EQ(mounted.T_body_camera.translation, Eigen::Vector3d(0.5, 0, 0.25));
+  EXPECT_LT((mounted.T_body_camera.rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(),
+            1e-9);
 }
 
 TEST(FlightFile, NamesFileLineAndFieldOfWhatIsWrong) {

@@ -174,6 +174,14 @@ TEST(Trajectory, RefusesWhatTheVehicleCannotFly) {
               testing::HasSubstr("expected more than"));
 }
 
+TEST(Trajectory, RefusesAPathWhoseAttitudeIsNoNumber) {
+  TrajectoryOptions options;
+  options.drag = std::nan("");
+  const auto path = Trajectory::through(slalom(), options);
+  ASSERT_FALSE(path.ok());
+  EXPECT_THAT(path.error().message, testing::HasSubstr("found nan"));
+}
+
 /// Attitude, velocity and position from gyroscopes and accelerometers alone: fourth order in the time step of
 /// two samples (Magnus expansion for the attitude, Simpson and Runge-Kutta for the rest).
 struct DeadReckoning {

@@ -2,6 +2,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -128,6 +130,48 @@ TEST(OpenWorld, NoStoneReachesIntoTheRoomAboutStartAndGoal) {
     }
   }
   EXPECT_GT(stones, 10000);
+}
+
+/// Wires end up to 1.5 m from where they begin.
+TEST(OpenWorld, NoWireOfAStreetHangsAboutTheGoal) {
+  int wires = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    const std::string text = generate_open_world(OpenWorldKind::street, seed, 100).files.sdf;
+    const auto from = text.find("name=\"wires_");
+    ASSERT_NE(from, std::string::npos);
+    for (auto at = text.find("<pose>", from); at != std::string::npos; at = text.find("<pose>", at + 1)) {
+      double pose[6] = {};
+      const char* next = text.c_str() + at + 6;
+      for (double& value : pose) {
+        char* end = nullptr;
+        value = std::strtod(next, &end);
+        next = end;
+      }
+      const double length = std::strtod(text.c_str() + text.find("<length>", at) + 8, nullptr);
+      const double half = 0.5 * length * std::abs(std::sin(pose[4]) * std::cos(pose[5]));
+      ++wires;
+      EXPECT_LT(pose[0] + half, 58) << seed;
+    }
+  }
+  EXPECT_GT(wires, 2000);
+}
+
+/// Two processes that look for the same world must not write one attempt over another.
+TEST(OpenWorld, EachAttemptHasAFileOfItsOwn) {
+  const fs::path folder = fs::temp_directory_path() / "pade_open_world_attempts_test";
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const fs::path file = folder / std::to_string(seed) / "rubble.sdf";
+    const auto found = find_open_world(OpenWorldKind::rubble, seed, 1500, file);
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    std::ifstream stream(file);
+    const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+    EXPECT_EQ(text, generate_open_world(OpenWorldKind::rubble, seed, 1500, 0).files.sdf) << "the first stays";
+    if (*found) {
+      EXPECT_EQ((*found)->file == file, (*found)->attempt == 0);
+      EXPECT_TRUE(fs::exists((*found)->file));
+    }
+  }
+  fs::remove_all(folder);
 }
 
 }  // namespace

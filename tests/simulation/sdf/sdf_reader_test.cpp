@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -95,7 +96,7 @@ TEST_F(SdfReader, ReadsACameraAsItIsMounted) {
 }
 
 TEST_F(SdfReader, OfACameraSaysWhatThePictureDoesNotShow) {
-  const auto read = [](const std::string& image, const std::string& rest) {
+  const auto read = [this](const std::string& image, const std::string& rest) {
     return read_sdf(world(model(kBox) +
                           "<model name='q'><link name='l'><sensor name='c' type='camera'><camera>"
                           "<horizontal_fov>1</horizontal_fov><image><width>640</width><height>480</height>" +
@@ -116,6 +117,114 @@ TEST_F(SdfReader, OfACameraSaysWhatThePictureDoesNotShow) {
   EXPECT_EQ(odd->cameras[0].noise_deviation, 0.02);
   for (const char* const what : {"<lens> <type> stereographic", "<center> 0.4 0.5", "<s> 3", "<mean> 0.1"})
     EXPECT_THAT(odd->warnings, testing::Contains(testing::HasSubstr(what)));
+}
+
+TEST_F(SdfReader, OfAWideAngleCameraSaysThatItIsDrawnAsAPinhole) {
+  const auto result =
+      read_sdf(world(model(kBox) +
+                     "<model name='q'><link name='l'><sensor name='c' type='wideanglecamera'><camera>"
+                     "<horizontal_fov>2</horizontal_fov><image><width>640</width><height>480</height></image>"
+                     "</camera></sensor></link></model>"));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_EQ(result->cameras.size(), 1U);
+  EXPECT_THAT(result->warnings,
+              Contains(testing::AllOf(HasSubstr("camera 'q::c'"), HasSubstr("wide-angle"))));
+}
+
+TEST_F(SdfReader, PlacesACameraByItsOwnPoseOnTheSensor) {
+  const auto mount = [this](const std::string& sensor, const std::string& camera) {
+    const auto result = read_sdf(
+        world(model(kBox) + "<model name='q'><link name='l'><sensor name='c' type='camera'><pose>" + sensor +
+              "</pose><camera><pose>" + camera +
+              "</pose><horizontal_fov>1</horizontal_fov><image><width>640</width><height>480</height></image>"
+              "</camera></sensor></link></model>"));
+    EXPECT_TRUE(result.ok()) << message(result);
+    return result->cameras.at(0).T_body_camera;
+  };
+  EXPECT_LT((mount("1 0 0 0 0 1.5707963267948966", "1 0 0.5 0 0 0").translation - Eigen::Vector3d(1, 1, 0.5))
+                .norm(),
+            1e-9);
+  const Pose turned = mount("0 0 0 0 0 0", "0 0 0 0 0.5 0");
+  const Pose same = mount("0 0 0 0 0.5 0", "0 0 0 0 0 0");
+  EXPECT_LT(turned.rotation.angularDistance(same.rotation), 1e-9);
+}
+
+TEST_F(SdfReader, ReadsAnImageOnceHoweverManySurfacesShowIt) {
+  EXPECT_TRUE(io::save_image((folder_ / "t.png").string(), cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 20, 30))));
+  const std::string material =
+      "<material><pbr><metal><albedo_map>t.png</albedo_map></metal></pbr></material>";
+  const auto result =
+      read_sdf(world("<model name='m'><link name='l'><visual name='a'>" + std::string(kBox) + material +
+                     "</visual><visual name='b'>" + kBox + material + "</visual></link></model>"));
+  ASSERT_TRUE(result.ok()) << message(result);
+  ASSERT_EQ(result->visuals.size(), 2U);
+  ASSERT_TRUE(result->visuals[0].material.image);
+  EXPECT_EQ(result->visuals[0].material.image, result->visuals[1].material.image);
+}
+
+TEST_F(SdfReader, RefusesANameThatMeansTwoModels) {
+  const auto of = [](const std::string& name, const std::string& inside) {
+    return "<sdf version='1.9'><model name='" + name + "'>" + inside + "</model></sdf>";
+  };
+  const std::string link = "<link name='l'><visual name='v'>" + std::string(kBox) + "</visual></link>";
+  write("part.sdf", of("worlds", link));
+  write("models/a/part.sdf", of("own", link));
+  write("models/a/model.sdf", of("a", "\n<include><uri>part.sdf</uri></include>"));
+  // Alone, the file beside the including one is taken.
+  const auto alone = read_sdf(world("<include><uri>model://a</uri></include>"));
+  ASSERT_TRUE(alone.ok()) << message(alone);
+  ASSERT_EQ(alone->visuals.size(), 1U);
+  EXPECT_THAT(alone->visuals[0].name, HasSubstr("own"));
+  EXPECT_THAT(message(read_sdf(
+                  world("<include><uri>part.sdf</uri></include><include><uri>model://a</uri></include>"))),
+              testing::AllOf(HasSubstr("model.sdf:2"), HasSubstr("part.sdf"), HasSubstr("means one thing")));
+}
+
+TEST_F(SdfReader, RefusesAnIncludeThatTheWorkingDirectoryWouldAnswer) {
+  const std::string model_text = "<sdf version='1.9'><model name='a'><link name='l'><visual name='v'>" +
+                                 std::string(kBox) + "</visual></link></model></sdf>";
+  write("models/a/model.sdf", model_text);
+  write("elsewhere/a/model.sdf", model_text);
+  const auto file = world("<include><uri>model://a</uri></include>");
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_ / "elsewhere");
+  const auto shadowed = read_sdf(file);
+  std::filesystem::current_path(folder_ / "models");
+  const auto same = read_sdf(file);
+  std::filesystem::current_path(before);
+  EXPECT_THAT(message(shadowed), testing::AllOf(HasSubstr("a.sdf:4"), HasSubstr("elsewhere")));
+  EXPECT_TRUE(same.ok()) << message(same);
+}
+
+TEST_F(SdfReader, NamesWhatIsTakenOutBeforeItIsRead) {
+  const std::string seen =
+      "<actor name='p'><skin><filename>walk.dae</filename></skin></actor>\n<road name='r'><width>4</width>"
+      "<point>0 0 0</point></road>\n<scene><ambient>1 1 1 1</ambient><fog><type>linear</type></fog></scene>" +
+      model(kBox);
+  for (const auto& [body, version] :
+       {std::pair{seen, "1.10"}, std::pair{"<gravity>maybe</gravity>" + seen, "1.9"}}) {
+    const auto result = read_sdf(world(body, version));
+    ASSERT_TRUE(result.ok()) << message(result);
+    for (const char* what : {"a.sdf:4: <actor> in <world> is not supported and left out",
+                             "a.sdf:5: <road> in <world>", "a.sdf:6: <fog> in <scene>"})
+      EXPECT_THAT(result->warnings, Contains(HasSubstr(what))) << version;
+  }
+}
+
+TEST_F(SdfReader, ReadsAttributesOfAnyLength) {
+  const std::string text = "<sdf comment='" + std::string(1 << 20, 'x') + "' version='1.9'><world name='w'>" +
+                           "<light name='" + std::string(1 << 20, 'y') +
+                           "' type='spot'><pose>a</pose></light>" + model(kBox) + "</world></sdf>";
+  const auto result = read_sdf(write("long.sdf", text));
+  ASSERT_TRUE(result.ok()) << message(result).substr(0, 200);
+  EXPECT_EQ(result->visuals.size(), 1U);
+}
+
+TEST_F(SdfReader, WarnsOfAWorldThatIsFarFromItsOrigin) {
+  EXPECT_THAT(read_sdf(world(model(kBox, "20000 0 0 0 0 0")))->warnings,
+              Contains(testing::AllOf(HasSubstr("a.sdf"), HasSubstr("move the world to its origin"))));
+  EXPECT_THAT(read_sdf(world(model(kBox)))->warnings,
+              testing::Not(Contains(HasSubstr("move the world to its origin"))));
 }
 
 TEST_F(SdfReader, FindsIncludedModelsMeshesAndImages) {

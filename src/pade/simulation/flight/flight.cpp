@@ -238,14 +238,15 @@ Status read_camera(const Yaml& node, const std::string& file, Flight& flight) {
     return Error{fmt::format("{}:{}: field camera: found {} x {} pixels, expected 2 to {}", file, node.line,
                              camera.width, camera.height, kLargest)};
   }
-  flight.camera = camera;
+  const auto states = [&](const char* name) { return node.find(name) != nullptr; };
+  const bool lens = states("distortion_model") || states("distortion");
+  flight.stated_camera = {states("width"), states("height"), states("fx"), states("fy"),
+                          states("cx"),    states("cy"),     lens};
+  const StatedCamera& stated = flight.stated_camera;
+  if (stated.width || stated.height || stated.fx || stated.fy || stated.cx || stated.cy || lens)
+    flight.camera = camera;
   flight.T_body_camera = mount;
-  if (pitch) {
-    // Nose down is a positive rotation about body y (left).
-    flight.T_body_camera =
-        Pose{rotation_exp({0, *pitch * kRadians, 0}), Eigen::Vector3d::Zero()} *
-        mount.value_or(Pose{Eigen::Quaterniond(forward_camera_rotation()), Eigen::Vector3d::Zero()});
-  }
+  if (pitch) flight.pitch_down = *pitch * kRadians;
   return {};
 }
 
@@ -323,7 +324,12 @@ Result<std::vector<CameraStation>> camera_stations(const Flight& flight, const T
   const double available = path.duration() - flight.first_frame - half_exposure;
   const int fitting =
       available < 0 ? 0 : static_cast<int>(std::floor(available * flight.frame_rate + 1e-9)) + 1;
-  if (fitting < 2 || flight.frames > fitting || flight.first_frame < half_exposure) {
+  if (flight.first_frame < half_exposure) {
+    return Error{
+        fmt::format("flight '{}': field first_frame_s: found {}, expected at least half the exposure, {} s",
+                    flight.name, flight.first_frame, half_exposure)};
+  }
+  if (fitting < 2 || flight.frames > fitting) {
     return Error{fmt::format(
         "flight '{}': found waypoints for {:.2f} s, which hold {} frames at {} Hz after the first {} s, "
         "expected {}; add waypoints or fly slower",

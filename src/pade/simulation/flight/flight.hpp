@@ -48,6 +48,14 @@ struct SensorOptions {
 /// Refuses numbers that make no sense (core/option_check.hpp).
 Status check(const SensorOptions& options);
 
+/// Which fields of a flight's camera the flight gives itself. The others are those of the world's first
+/// camera, where there is one: at the stated size, with the same field of view.
+struct StatedCamera {
+  bool width = true, height = true;
+  bool fx = true, fy = true, cx = true, cy = true;
+  bool lens = true;  ///< distortion model and coefficients
+};
+
 struct Flight {
   std::string name;
   std::vector<Waypoint> waypoints;
@@ -59,7 +67,9 @@ struct Flight {
   double exposure_time = 0;      ///< s; motion blur if it is not 0; poses are of mid exposure
   int blur_samples = 8;          ///< pictures that are averaged over the exposure
   std::optional<Camera> camera;  ///< without it the first camera of the world, else 640 x 480 with f = 554.26
+  StatedCamera stated_camera;    ///< what of `camera` counts where the world has one too
   std::optional<Pose> T_body_camera;  ///< without it as in the world, else looking along body x
+  std::optional<double> pitch_down;   ///< radians; turns the camera, where it is mounted, about body y
   ImageOptions image;
   bool states_colour = false;  ///< `image.colour`; else that of the world's camera counts, where it has one
   bool states_read_noise = false;  ///< the same of `image.read_noise`

@@ -17,6 +17,7 @@
 #include "pade/simulation/flight/frame_maker.hpp"
 #include "pade/simulation/flight/sensor_files.hpp"
 #include "pade/simulation/render/truth.hpp"
+#include "pade/simulation/world/geometry.hpp"
 #include "pade/simulation/world/world_fingerprint.hpp"
 
 namespace pade::simulation {
@@ -260,6 +261,13 @@ Status Recorder::flow(std::size_t index, const cv::Mat& depth) const {
 Status check_free(const Scene& scene, const std::vector<CameraStation>& stations) {
   for (std::size_t i = 0; i < stations.size(); ++i) {
     const Eigen::Vector3d& p = stations[i].T_world_camera.translation;
+    if (!(p.norm() <= farthest_place)) {
+      return Error{
+          fmt::format("frame {} at {} s: found the camera {:.0f} m from the origin of the world, expected at "
+                      "most {:.0f} m, "
+                      "since rays are of single precision: move world and flight to their origin",
+                      i + 1, to_string(stations[i].time), p.norm(), farthest_place)};
+    }
     if (const auto solid = scene.inside_of(p)) {
       return Error{fmt::format(
           "frame {} at {} s: found the camera at ({:.2f}, {:.2f}, {:.2f}) inside '{}', expected free space",
@@ -286,6 +294,27 @@ Status check_target(const fs::path& out, io::Overwrite overwrite) {
   return {};
 }
 
+/// The fields that a flight states, with those of the world's camera for the rest: what is left out of the
+/// projection has the world's field of view, about the same middle.
+Camera completed(const Camera& own, const StatedCamera& stated, const Camera& of_world) {
+  Camera out = own;
+  if (!stated.width) out.width = of_world.width;
+  if (!stated.height) out.height = of_world.height;
+  const double scale = static_cast<double>(out.width) / of_world.width;
+  const auto centre = [scale](double pixel, int before, int now) {
+    return 0.5 * (now - 1) + scale * (pixel - 0.5 * (before - 1));
+  };
+  if (!stated.fx) out.fx = scale * of_world.fx;
+  if (!stated.fy) out.fy = stated.fx ? own.fx : scale * of_world.fy;
+  if (!stated.cx) out.cx = centre(of_world.cx, of_world.width, out.width);
+  if (!stated.cy) out.cy = centre(of_world.cy, of_world.height, out.height);
+  if (!stated.lens) {
+    out.distortion = of_world.distortion;
+    out.coefficients = of_world.coefficients;
+  }
+  return out;
+}
+
 }  // namespace
 
 FlightCamera flight_camera(const Flight& flight, const World& world) {
@@ -307,15 +336,38 @@ FlightCamera flight_camera(const Flight& flight, const World& world) {
     if (!flight.states_read_noise)
       out.image.read_noise = sensor.noise_deviation.value_or(out.image.read_noise);
   }
-  if (flight.camera) out.camera = *flight.camera;
+  if (flight.camera)
+    out.camera =
+        world.cameras.empty() ? *flight.camera : completed(*flight.camera, flight.stated_camera, out.camera);
   if (flight.T_body_camera) out.T_body_camera = *flight.T_body_camera;
+  if (flight.pitch_down) {
+    // Nose down is a positive rotation about body y (left).
+    const Pose turn{rotation_exp({0, *flight.pitch_down, 0}), Eigen::Vector3d::Zero()};
+    out.T_body_camera.rotation = (turn * out.T_body_camera).rotation;
+  }
   return out;
+}
+
+std::optional<std::string> precision_warning(const Flight& flight) {
+  for (std::size_t i = 0; i < flight.waypoints.size(); ++i) {
+    const double distance = flight.waypoints[i].position.norm();
+    if (!(distance > farthest_exact_place)) continue;
+    return fmt::format(
+        "flight '{}': waypoint {}: found {:.0f} m from the origin of the world, where single precision makes "
+        "depth inexact (beyond {:.0f} m): move world and flight to their origin",
+        flight.name, i + 1, distance, farthest_exact_place);
+  }
+  return std::nullopt;
 }
 
 Status write_sequence(const Scene& scene, const Flight& flight, const fs::path& target,
                       const SequenceOptions& options, const FrameProgress& progress) {
   std::error_code failed;
-  const fs::path out = fs::absolute(target.filename().empty() ? target.parent_path() : target, failed);
+  // "." and "folder/" have a name and a parent only where they truly lie.
+  fs::path out = fs::weakly_canonical(fs::absolute(target, failed), failed);
+  if (!out.has_filename()) out = out.parent_path();
+  if (failed || !out.has_filename())
+    return Error{fmt::format("{}: found no name for the new folder", target.string())};
   const auto path = Trajectory::through(flight.waypoints, flight.trajectory);
   if (!path) return Error{fmt::format("flight '{}': {}", flight.name, path.error().message)};
   const FlightCamera camera = flight_camera(flight, scene.world());
@@ -352,10 +404,7 @@ Status write_sequence(const Scene& scene, const Flight& flight, const fs::path& 
   }
   const Recorder recorder(scene, flight, *path, camera, options, std::move(chosen), work);
   if (const Status s = recorder.record(progress); !s) return s;
-  if (options.overwrite == io::Overwrite::replace) fs::remove_all(out, failed);
-  fs::rename(work, out, failed);
-  if (failed) return Error{fmt::format("{}: cannot be put in place: {}", out.string(), failed.message())};
-  return {};
+  return io::put_in_place(work, out, options.overwrite);
 }
 
 }  // namespace pade::simulation

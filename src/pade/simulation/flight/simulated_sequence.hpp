@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "pade/core/result.hpp"
@@ -28,8 +29,8 @@ struct SequenceOptions {
 /// Called after each frame with the numbers of finished frames and of all frames.
 using FrameProgress = std::function<void(int, int)>;
 
-/// The camera of a flight: its own, else the world's first, else the paper's 640 x 480 with f = 554.26. With
-/// it T_body_camera, colour and noise where the flight leaves them to the world.
+/// The camera of a flight: field by field its own, else the world's first, else the paper's 640 x 480 with
+/// f = 554.26. With it T_body_camera, colour and noise where the flight leaves them to the world.
 struct FlightCamera {
   Camera camera;
   Pose T_body_camera;
@@ -37,11 +38,15 @@ struct FlightCamera {
 };
 FlightCamera flight_camera(const Flight& flight, const World& world);
 
+/// What to say of a flight that leads farther from the origin than farthest_exact_place (world/geometry.hpp);
+/// empty where it does not.
+std::optional<std::string> precision_warning(const Flight& flight);
+
 /// Renders `flight` through `scene` into the folder `target`. Until it is complete everything lies in a
 /// hidden folder beside it; each file appears there whole or not at all, so that the work of a killed run is
 /// taken up by the next one and the result has the same bytes. Refuses an existing `target` (unless told to
-/// replace it), waypoints that the limits forbid, a path too short for the frames, a camera inside a solid,
-/// and output that cannot be written.
+/// replace it), waypoints that the limits forbid, a path too short for the frames, a camera inside a solid or
+/// beyond farthest_place, and output that cannot be written.
 Status write_sequence(const Scene& scene, const Flight& flight, const std::filesystem::path& target,
                       const SequenceOptions& options, const FrameProgress& progress = {});
 

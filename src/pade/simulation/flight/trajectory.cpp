@@ -330,7 +330,8 @@ Status Trajectory::check_limits() const {
                              std::acos(std::clamp(up, -1.0, 1.0)),
                              std::max(turned, state.angular_velocity.norm())};
     for (int i = 0; i < 4; ++i) {
-      if (values[i] > checks[i].worst) {
+      // NaN is worse than any number, and stays the worst.
+      if (!(values[i] <= checks[i].worst) && !std::isnan(checks[i].worst)) {
         checks[i].worst = values[i];
         checks[i].when = t;
       }

@@ -27,8 +27,8 @@ class OpenGenerator : Furniture {
  public:
   OpenGenerator(std::string_view kind, std::uint64_t seed, double density, int attempt)
       : Furniture(kind,
-                  fmt::format("Made by: pade simulate --random {} --seed {} --density {} (attempt {})", kind,
-                              seed, density, attempt + 1),
+                  fmt::format("Made by pade simulate, random {}, seed {}, density {}, attempt {}", kind, seed,
+                              density, attempt + 1),
                   (seed * 1000003 + 29) * 64 + static_cast<std::uint64_t>(attempt)),
         density_(density) {}
 
@@ -288,7 +288,7 @@ OpenWorld OpenGenerator::street() {
     }
   });
   out_.model("wires");
-  for (double x = 4; x < 58; x += random_.uniform(3, 7)) wire(x, 5);
+  for (double x = 4; x < 56; x += random_.uniform(3, 7)) wire(x, 5);
   return finish_world();
 }
 

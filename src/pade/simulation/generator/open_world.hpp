@@ -20,7 +20,8 @@ enum class OpenWorldKind { forest, rubble, building_site, street };
 struct OpenWorld {
   WorldFiles files;
   Eigen::Vector3d start = Eigen::Vector3d::Zero();  ///< nothing stands within 2.5 m of it, m
-  Eigen::Vector3d goal = Eigen::Vector3d::Zero();   ///< nothing stands within 2 m of it; 60 m east of it, m
+  Eigen::Vector3d goal =
+      Eigen::Vector3d::Zero();  ///< nothing stands within 2 m of it; 60 m east of the start, m
 };
 
 /// The least and the greatest density that is made, things per hectare.

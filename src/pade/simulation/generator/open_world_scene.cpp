@@ -90,16 +90,20 @@ Result<std::optional<OpenWorldScene>> find_open_world(OpenWorldKind kind, std::u
                              greatest_density)};
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const OpenWorld made = generate_open_world(kind, seed, density, attempt);
-    if (const Status s = write_world(made.files, world_file); !s) return s.error();
-    auto world = read_sdf(world_file);
+    const std::filesystem::path file =
+        attempt == 0
+            ? world_file
+            : world_file.parent_path() / fmt::format("attempt-{}", attempt + 1) / world_file.filename();
+    if (const Status s = write_world(made.files, file); !s) return s.error();
+    auto world = read_sdf(file);
     if (!world) return world.error();
     auto scene = Scene::build(std::move(world).value());
     if (!scene) return scene.error();
     auto surface = SurfaceDistance::build(*scene);
     if (!surface) return surface.error();
     if (is_passable(*surface, made.start, made.goal)) {
-      OpenWorldScene found{std::move(scene).value(), std::move(surface).value(), made.start, made.goal,
-                           attempt};
+      OpenWorldScene found{
+          std::move(scene).value(), std::move(surface).value(), made.start, made.goal, attempt, file};
       return std::optional(std::move(found));
     }
   }

@@ -32,15 +32,17 @@ struct OpenWorldScene {
   Eigen::Vector3d start;
   Eigen::Vector3d goal;
   int attempt = 0;  ///< of generate_open_world(): how many worlds of this seed had no way through
+  std::filesystem::path file = {};  ///< of the world, where it was written by make_open_world()
 };
 
 /// As make_open_world(), but nothing, which is no error, where none of the 10 worlds of a seed has a way.
 Result<std::optional<OpenWorldScene>> find_open_world(OpenWorldKind kind, std::uint64_t seed, double density,
                                                       const std::filesystem::path& world_file);
 
-/// Writes the first world of this seed that a ball of 0.5 m gets through to `world_file` (meshes beside it)
-/// and builds it. Refuses a density out of range, a seed without such a world in 10 attempts, and files that
-/// cannot be written.
+/// Writes the first world of this seed that a ball of 0.5 m gets through and builds it. Each attempt has a
+/// file of its own, so that no other process puts another one under its name: the first is `world_file`
+/// (meshes beside it), the n-th attempt-n/ beside that. Refuses a density out of range, a seed without such a
+/// world in 10 attempts, and files that cannot be written.
 Result<OpenWorldScene> make_open_world(OpenWorldKind kind, std::uint64_t seed, double density,
                                        const std::filesystem::path& world_file);
 

@@ -24,9 +24,7 @@ constexpr double kPi = std::numbers::pi;
 class Generator : Furniture {
  public:
   Generator(std::string_view name, std::uint64_t seed)
-      : Furniture(name,
-                  fmt::format("Made by: pade simulate --random {} --seed {} --write-world {}.sdf", name, seed,
-                              name),
+      : Furniture(name, fmt::format("Made by pade simulate, random {}, seed {}", name, seed),
                   seed * 1000003 + 17) {}
 
   WorldFiles building();

@@ -20,7 +20,9 @@ enum class WorldKind { building, street, forest, rubble, corridor };
 /// - building: a house with a tower on a lawn (the paper's Figure 4), facades at x = 26 m and 27 m; free
 /// along y = 3 m,
 ///   before the lamps at x = 22.9 m, and along the line from (4, 16.5) to (18, 2)
-/// - street: a road along x between houses; free within 1.6 m of the centre line
+/// - street: a road along x between houses; free within 1.4 m of the centre line (turned signs reach that
+/// far,
+///   all else stays 1.6 m away)
 /// - forest: trees about a row of trunks on the x axis, 7 m apart, to be flown around
 /// - rubble: a half-collapsed hall along x with thin poles and wires; free within 0.9 m of y = 0 from 1.2 m
 /// to 2.6 m

@@ -33,23 +33,6 @@ struct Paint {
   bool stained = false;  ///< large soft stains hide that a pattern repeats
 };
 
-/// Sub-pixel positions: pairs mirrored about the centre, every row and column of the sample grid used once.
-std::vector<Eigen::Vector2d> sample_pattern(int samples) {
-  std::vector<Eigen::Vector2d> offsets;
-  if (samples == 1) return {Eigen::Vector2d::Zero()};
-  for (int i = 0; i < samples; ++i) {
-    const int half = samples / 2;
-    // Rows in an order that spreads neighbours: odd positions first, then even; mirrored by construction.
-    const int k = i < half ? i : samples - 1 - i;
-    const int row = (2 * k + 1) % samples;
-    const double x = (k + 0.5) / samples - 0.5;
-    const double y = (row + 0.5) / samples - 0.5;
-    offsets.emplace_back(i < half ? x : -x, i < half ? y : -y);
-  }
-  if (samples % 2 == 1) offsets[static_cast<std::size_t>(samples / 2)].setZero();
-  return offsets;
-}
-
 struct Lane {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< world, Z = 1 in the camera
   Primitive primitive;
@@ -66,6 +49,24 @@ struct Fragment {
 };
 
 }  // namespace
+
+std::vector<Eigen::Vector2d> sample_pattern(int samples) {
+  std::vector<Eigen::Vector2d> offsets;
+  if (samples == 1) return {Eigen::Vector2d::Zero()};
+  for (int i = 0; i < samples; ++i) {
+    const int half = samples / 2;
+    // Rows in an order that spreads neighbours, mirrored by construction: odd positions for an even number;
+    // for an odd one, where odd positions would meet their own mirror images, from both ends in turn.
+    const int k = i < half ? i : samples - 1 - i;
+    const int from_both_ends = k % 2 == 1 ? samples - 1 - k : k;
+    const int row = samples % 2 == 1 ? from_both_ends : (2 * k + 1) % samples;
+    const double x = (k + 0.5) / samples - 0.5;
+    const double y = (row + 0.5) / samples - 0.5;
+    offsets.emplace_back(i < half ? x : -x, i < half ? y : -y);
+  }
+  if (samples % 2 == 1) offsets[static_cast<std::size_t>(samples / 2)].setZero();
+  return offsets;
+}
 
 struct Renderer::Implementation {
   const Scene& scene;

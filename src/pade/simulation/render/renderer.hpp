@@ -4,7 +4,9 @@
 
 #include <memory>
 #include <string_view>
+#include <vector>
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 
 #include "pade/core/pose.hpp"
@@ -38,6 +40,10 @@ struct Rendering {
   cv::Mat radiance;  ///< CV_32FC3, RGB, linear; 1 is a white surface in full light; 0 outside the lens
   cv::Mat depth;     ///< CV_32FC1, exact at the pixel centres, as exact_depth() gives it
 };
+
+/// Sub-pixel positions, in pixels from the centre: pairs mirrored about it, every row and column of the grid
+/// of `samples` x `samples` used once.
+std::vector<Eigen::Vector2d> sample_pattern(int samples);
 
 /// Holds the textures of a scene, which must outlive it.
 class Renderer {

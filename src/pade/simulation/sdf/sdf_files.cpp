@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <regex>
+#include <map>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -51,10 +53,78 @@ std::optional<std::pair<std::string, std::size_t>> element(const std::string& te
   return std::nullopt;
 }
 
+constexpr std::string_view kSpace = " \t\r\n";
+
+/// The end of the tag that begins at `open`, at its '>'; npos where it has none. Attributes may hold any '>'.
+std::size_t end_of_tag(const std::string& text, std::size_t open) {
+  char quote = 0;
+  for (std::size_t at = open; at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote != 0) {
+      if (c == quote) quote = 0;
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '>') {
+      return at;
+    }
+  }
+  return std::string::npos;
+}
+
+struct Attribute {
+  std::string value;
+  std::size_t position = 0;  ///< where the value begins
+};
+
+/// An attribute of the tag that begins at `open`. By hand: std::regex needs stack for each character.
+std::optional<Attribute> attribute_of(const std::string& text, std::size_t open, std::string_view name) {
+  constexpr std::size_t kNone = std::string::npos;
+  std::size_t at = text.find_first_of(" \t\r\n/>", open);
+  while (at != kNone) {
+    at = text.find_first_not_of(kSpace, at);
+    const std::size_t end = at == kNone ? kNone : text.find_first_of(" \t\r\n=/>", at);
+    const std::size_t equals = end == kNone ? kNone : text.find_first_not_of(kSpace, end);
+    if (equals == kNone || text[equals] != '=') return std::nullopt;
+    const std::size_t quote = text.find_first_not_of(kSpace, equals + 1);
+    if (quote == kNone || (text[quote] != '"' && text[quote] != '\'')) return std::nullopt;
+    const std::size_t close = text.find(text[quote], quote + 1);
+    if (close == kNone) return std::nullopt;
+    if (std::string_view(text).substr(at, end - at) == name)
+      return Attribute{text.substr(quote + 1, close - quote - 1), quote + 1};
+    at = close + 1;
+  }
+  return std::nullopt;
+}
+
+/// The next tag of an element with attributes.
+std::size_t tag_with_attributes(const std::string& text, const std::string& tag, std::size_t from) {
+  std::size_t open = text.find('<' + tag, from);
+  while (open != std::string::npos && (open + 1 + tag.size() >= text.size() ||
+                                       kSpace.find(text[open + 1 + tag.size()]) == std::string_view::npos))
+    open = text.find('<' + tag, open + 1);
+  return open;
+}
+
+/// The version that a text without comments states.
+std::optional<Attribute> stated_version(const std::string& text) {
+  for (std::size_t open = tag_with_attributes(text, "sdf", 0); open != std::string::npos;
+       open = tag_with_attributes(text, "sdf", open + 1)) {
+    if (auto found = attribute_of(text, open, "version")) return found;
+  }
+  return std::nullopt;
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_known_version(const std::string& version) {
+  return version.size() == 3 && version.starts_with("1.") && is_digit(version[2]);
+}
+bool is_later_version(const std::string& version) {
+  return version.size() == 4 && version.starts_with("1.1") && is_digit(version[3]);
+}
+
 Status check_version(const fs::path& file, const std::string& text, bool may_be_later) {
-  static const std::regex version_attribute(R"re(<sdf\s[^>]*version\s*=\s*["']([^"']*)["'])re");
-  std::smatch found;
-  if (!std::regex_search(text, found, version_attribute)) {
+  const auto found = stated_version(text);
+  if (!found) {
     if (text.find("<robot") != std::string::npos) {
       return Error{
           fmt::format("{}: found URDF (<robot>), expected SDF: convert it (gz sdf -p FILE.urdf > FILE.sdf)",
@@ -62,13 +132,11 @@ Status check_version(const fs::path& file, const std::string& text, bool may_be_
     }
     return Error{fmt::format("{}: found no <sdf version=\"...\">, expected an SDF file", file.string())};
   }
-  static const std::regex known(R"(1\.[0-9])");
-  static const std::regex later(R"(1\.1[0-9])");
-  const std::string version = found[1].str();
-  if (!std::regex_match(version, known) && !(may_be_later && std::regex_match(version, later))) {
+  const std::string& version = found->value;
+  if (!is_known_version(version) && !(may_be_later && is_later_version(version))) {
     return Error{fmt::format(
         "{}:{}: found SDF version {}, expected 1.0 to 1.9 (write version=\"1.9\" if nothing newer is used)",
-        file.string(), line_at(text, static_cast<std::size_t>(found.position(1))), version)};
+        file.string(), line_at(text, found->position), version)};
   }
   return {};
 }
@@ -144,25 +212,92 @@ void blank(std::string& text, std::size_t from, std::size_t to) {
 /// Of lights that are no sun nothing is drawn, but they are named: all of them become points, without
 /// contents.
 void empty_lamps(std::string& text) {
-  static const std::regex lamp(R"re(<light\s[^>]*type\s*=\s*["'](point|spot)["'][^>]*>)re");
-  std::smatch found;
-  std::size_t from = 0;
-  while (std::regex_search(text.cbegin() + static_cast<std::ptrdiff_t>(from), text.cend(), found, lamp)) {
-    const std::size_t open = from + static_cast<std::size_t>(found.position(0));
-    const std::size_t inside = open + static_cast<std::size_t>(found.length(0));
-    const std::size_t type = from + static_cast<std::size_t>(found.position(1));
-    const bool empty = text[inside - 2] == '/';
-    const std::size_t end = empty ? std::string::npos : text.find("</light>", inside);
-    from = inside;
-    if (end != std::string::npos) blank(text, inside, end);
-    if (text.compare(type, 4, "spot") == 0) {
-      text.replace(type, 4, "point");
-      ++from;
-    }
+  std::size_t open = tag_with_attributes(text, "light", 0);
+  for (; open != std::string::npos; open = tag_with_attributes(text, "light", open + 1)) {
+    const auto type = attribute_of(text, open, "type");
+    const std::size_t tag_end = end_of_tag(text, open);
+    if (!type || tag_end == std::string::npos || (type->value != "point" && type->value != "spot")) continue;
+    const bool empty = text[tag_end - 1] == '/';
+    const std::size_t end = empty ? std::string::npos : text.find("</light>", tag_end);
+    if (end != std::string::npos) blank(text, tag_end + 1, end);
+    if (type->value == "spot") text.replace(type->position, 4, "point");
   }
 }
 
-Status check(const fs::path& file, const ResourcePaths& resources, std::vector<fs::path>& open) {
+/// The name of the element that a tag stands in.
+std::string parent_of(const std::string& text, std::size_t position) {
+  std::vector<std::string> open;
+  for (std::size_t at = text.find('<'); at < position; at = text.find('<', at)) {
+    const std::size_t end = end_of_tag(text, at);
+    if (end == std::string::npos) break;
+    const char next = text[at + 1];
+    if (next == '/') {
+      if (!open.empty()) open.pop_back();
+    } else if (next != '?' && next != '!' && text[end - 1] != '/') {
+      open.push_back(text.substr(at + 1, text.find_first_of(" \t\r\n/>", at + 1) - at - 1));
+    }
+    at = end;
+  }
+  return open.empty() ? std::string() : open.back();
+}
+
+/// Elements that are taken out of the text before libsdformat reads it, to be told all the same: by kind,
+/// with the place of the first.
+class LeftOut {
+ public:
+  explicit LeftOut(std::string file) : file_(std::move(file)) {}
+
+  void add(const std::string& text, const std::string& tag, std::size_t open) {
+    // These would change the picture, and are named (sdf_warnings.hpp) where libsdformat reads the file
+    // itself.
+    static constexpr std::array<std::string_view, 5> kNamed = {"actor", "fog", "plugin", "population",
+                                                               "road"};
+    if (std::find(kNamed.begin(), kNamed.end(), tag) == kNamed.end()) return;
+    auto& [where, count] = kinds_[fmt::format("<{}> in <{}>", tag, parent_of(text, open))];
+    if (count++ == 0) where = fmt::format("{}:{}", file_, line_at(text, open));
+  }
+  [[nodiscard]] std::vector<std::string> sentences() const {
+    std::vector<std::string> out;
+    for (const auto& [what, kind] : kinds_) {
+      out.push_back(fmt::format("{}: {} is not supported and left out{}", kind.first, what,
+                                kind.second == 1 ? "" : fmt::format(", {} times", kind.second)));
+    }
+    return out;
+  }
+
+ private:
+  std::string file_;
+  std::map<std::string, std::pair<std::string, int>> kinds_;
+};
+
+std::string without_scheme(const std::string& uri) {
+  std::string name = uri;
+  for (const std::string_view scheme : {"model://", "file://", "package://"}) {
+    if (name.starts_with(scheme)) name = name.substr(scheme.size());
+  }
+  return name;
+}
+
+bool same_place(const fs::path& a, const fs::path& b) {
+  std::error_code failed;
+  return fs::equivalent(a, b, failed) && !failed;
+}
+
+/// Notes what an include means; what libsdformat would take in its place, which sees the name alone; empty
+/// where it takes the same.
+std::optional<fs::path> mistaken_for(const std::string& name, const fs::path& meant,
+                                     IncludedFiles& includes) {
+  const auto [known, fresh] = includes.try_emplace(name, meant);
+  if (!fresh && !same_place(known->second, meant)) return known->second;
+  const fs::path here = without_scheme(name);
+  std::error_code failed;
+  if (here.is_relative() && io::path_exists(here) && !same_place(here, meant))
+    return fs::absolute(here, failed);
+  return std::nullopt;
+}
+
+Status check(const fs::path& file, const ResourcePaths& resources, std::vector<fs::path>& open,
+             IncludedFiles& includes) {
   constexpr std::size_t kDeepest = 32;
   std::error_code ignored;
   const fs::path self = fs::weakly_canonical(file, ignored);
@@ -191,7 +326,14 @@ Status check(const fs::path& file, const ResourcePaths& resources, std::vector<f
                  : "which is in none of the resource folders (--resource-path, models/ beside the "
                    "world, GZ_SIM_RESOURCE_PATH)")};
     }
-    if (const Status status = check(*model, resources, open); !status) return status.error();
+    if (const auto other = mistaken_for(name, *found, includes)) {
+      return Error{
+          fmt::format("{}:{}: found an include of '{}', which means {} here, and for which libsdformat takes "
+                      "{}: expected a "
+                      "name that means one thing (rename one, or run in another folder)",
+                      file.string(), line_at(text, from), name, found->string(), other->string())};
+    }
+    if (const Status status = check(*model, resources, open, includes); !status) return status.error();
   }
   open.pop_back();
   return {};
@@ -201,10 +343,7 @@ Status check(const fs::path& file, const ResourcePaths& resources, std::vector<f
 
 std::optional<fs::path> resolve_uri(const std::string& uri, const fs::path& base,
                                     const ResourcePaths& resources) {
-  std::string name = uri;
-  for (const std::string_view scheme : {"model://", "file://", "package://"}) {
-    if (name.starts_with(scheme)) name = name.substr(scheme.size());
-  }
+  const std::string name = without_scheme(uri);
   if (name.empty()) return std::nullopt;
   if (fs::path(name).is_absolute())
     return io::path_exists(name) ? std::optional<fs::path>(name) : std::nullopt;
@@ -240,7 +379,8 @@ std::optional<fs::path> model_file(const fs::path& path) {
   return std::nullopt;
 }
 
-std::string without_unseen(std::string text) {
+SeenText without_unseen(std::string text, const std::string& file) {
+  LeftOut left_out(file);
   text = without_comments(std::move(text));
   empty_lamps(text);
   for (const std::string_view name : kUnseen) {
@@ -251,26 +391,28 @@ std::string without_unseen(std::string text) {
       const bool whole =
           after < text.size() && std::string_view(" \t\r\n/>").find(text[after]) != std::string::npos;
       const std::size_t end = whole ? end_of_element(text, tag, open) : std::string::npos;
-      if (end != std::string::npos) blank(text, open, end);
+      if (end != std::string::npos) {
+        left_out.add(text, tag, open);
+        blank(text, open, end);
+      }
       open = text.find("<" + tag, open + 1);
     }
   }
-  if (const std::string later = later_version(text); !later.empty()) {
-    const std::size_t at = text.find(later, text.find("<sdf"));
-    text.replace(at, later.size(), "1.9");
-  }
-  return text;
+  if (const auto version = stated_version(text); version && is_later_version(version->value))
+    text.replace(version->position, version->value.size(), "1.9");
+  return {std::move(text), left_out.sentences()};
 }
 
 std::string later_version(const std::string& text) {
-  static const std::regex later(R"re(<sdf\s[^>]*version\s*=\s*["'](1\.1[0-9])["'])re");
-  std::smatch found;
-  return std::regex_search(text, found, later) ? found[1].str() : std::string();
+  const auto version = stated_version(without_comments(text));
+  return version && is_later_version(version->value) ? version->value : std::string();
 }
 
-Status check_sdf_files(const fs::path& file, const ResourcePaths& resources) {
+Result<IncludedFiles> check_sdf_files(const fs::path& file, const ResourcePaths& resources) {
   std::vector<fs::path> open;
-  return check(file, resources, open);
+  IncludedFiles includes;
+  if (const Status status = check(file, resources, open, includes); !status) return status.error();
+  return includes;
 }
 
 }  // namespace pade::simulation

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,14 +24,25 @@ std::optional<std::filesystem::path> resolve_uri(const std::string& uri, const s
 /// The SDF file of a model folder (by model.config, else model.sdf), or the path itself if it is a file.
 std::optional<std::filesystem::path> model_file(const std::filesystem::path& path);
 
+/// Of each include, by its <uri>, the file or folder that it means.
+using IncludedFiles = std::map<std::string, std::filesystem::path>;
+
 /// Checks a file and all that it includes: it can be read, its version is 1.0 to 1.9 (of the file itself also
-/// a later 1.x), included files exist, and none includes itself.
-Status check_sdf_files(const std::filesystem::path& file, const ResourcePaths& resources);
+/// a later 1.x), included files exist, and none includes itself. libsdformat looks for an include by its name
+/// alone, and first in the working directory: a name that means two things, or another one there, is refused.
+Result<IncludedFiles> check_sdf_files(const std::filesystem::path& file, const ResourcePaths& resources);
+
+/// What libsdformat is given in place of a file.
+struct SeenText {
+  std::string text;
+  std::vector<std::string> left_out;  ///< what would have changed the picture, one sentence each
+};
 
 /// A file in words that libsdformat 12 takes, with the same lines: a later version as 1.9, and without what
 /// cannot be seen (physics, collisions, plugins, user interfaces ...), which may be wrong in ways that do not
 /// matter here.
-std::string without_unseen(std::string text);
+/// @param file  its name in messages
+SeenText without_unseen(std::string text, const std::string& file);
 
 /// The version that a file states, if it is later than 1.9; else empty.
 std::string later_version(const std::string& text);

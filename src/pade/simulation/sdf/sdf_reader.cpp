@@ -15,6 +15,7 @@
 #include "pade/simulation/sdf/sdf_sensors.hpp"
 #include "pade/simulation/sdf/sdf_warnings.hpp"
 #include "pade/simulation/world/extrusion.hpp"
+#include "pade/simulation/world/geometry.hpp"
 #include "pade/simulation/world/mesh_file.hpp"
 #include "pade/simulation/world/named_colours.hpp"
 
@@ -83,6 +84,8 @@ class Reader {
   WorldState state_;
   std::set<std::string> script_told_;
   std::map<std::pair<std::string, SubMesh>, std::vector<MeshPart>> meshes_;
+  TextureImages images_;
+  IncludedFiles includes_;
 };
 
 Pose resolved(const sdf::SemanticPose& semantic, const ignition::math::Pose3d& raw) {
@@ -123,7 +126,9 @@ Attempt attempt(const fs::path& file, const std::optional<std::string>& text,
 Result<sdf::SDFPtr> Reader::parse() {
   sdf::ParserConfig config;
   const auto find = [this](const std::string& uri) {
-    const auto found = resolve_uri(uri, file_.parent_path(), resources_);
+    const auto checked = includes_.find(uri);
+    const auto found = checked != includes_.end() ? std::optional(checked->second)
+                                                  : resolve_uri(uri, file_.parent_path(), resources_);
     if (!found) return std::string();
     // libsdformat takes a folder only with a model.config, but any file.
     const bool described =
@@ -140,17 +145,24 @@ Result<sdf::SDFPtr> Reader::parse() {
     world_.warnings.push_back(fmt::format(
         "{}: SDF version {} is read as 1.9, which does not know what is newer", file_.string(), later));
   }
-  const Attempt first =
-      attempt(file_, later.empty() ? std::nullopt : std::optional(without_unseen(*text)), config);
-  if (!first.error) return first.document;
-  const Attempt again = attempt(file_, without_unseen(*text), config);
+  std::optional<Error> wrong;
+  if (later.empty()) {
+    const Attempt whole = attempt(file_, std::nullopt, config);
+    if (!whole.error) return whole.document;
+    wrong = whole.error;
+  }
+  SeenText seen = without_unseen(*text, file_.string());
+  const Attempt again = attempt(file_, seen.text, config);
   if (again.error) return *again.error;  // what is seen is wrong, too
-  world_.warnings.push_back(first.error->message + ": left out, since nobody sees it");
+  if (wrong) world_.warnings.push_back(wrong->message + ": left out, since nobody sees it");
+  for (std::string& left_out : seen.left_out) world_.warnings.push_back(std::move(left_out));
   return again.document;
 }
 
 Result<World> Reader::read() {
-  if (const Status status = check_sdf_files(file_, resources_); !status) return status.error();
+  auto includes = check_sdf_files(file_, resources_);
+  if (!includes) return includes.error();
+  includes_ = std::move(includes).value();
   const auto document = parse();
   if (!document) return document.error();
   const sdf::ElementPtr element = (*document)->Root();
@@ -181,6 +193,8 @@ Result<World> Reader::read() {
   } else {
     return Error{fmt::format("{}: found neither a world nor a model", file_.string())};
   }
+  if (const auto inexact = precision_warning(world_))
+    world_.warnings.push_back(fmt::format("{}: {}", file_.string(), *inexact));
   return std::move(world_);
 }
 
@@ -351,7 +365,7 @@ Result<Material> Reader::material_of(const sdf::Material& source) {
       return Error{
           fmt::format("{}: found albedo_map '{}', which is neither beside it nor in a resource folder",
                       place_of(source.Element(), file_.string()), image)};
-    auto pixels = read_texture_image(*found);
+    auto pixels = images_.read(*found);
     if (!pixels) return pixels.error();
     material.image = std::move(pixels).value();
     material.image_file = *found;
@@ -426,7 +440,7 @@ Status Reader::add_mesh(const sdf::Mesh& mesh, Visual visual, bool has_material)
   const SubMesh wanted{mesh.Submesh(), mesh.CenterSubmesh()};
   auto known = meshes_.find({file->string(), wanted});
   if (known == meshes_.end()) {
-    auto parts = read_mesh(*file, wanted, resources_, world_.warnings);
+    auto parts = read_mesh(*file, wanted, resources_, images_, world_.warnings);
     if (!parts) {
       return Error{fmt::format("{}: visual '{}': {}", place_of(mesh.Element(), file_.string()), visual.name,
                                parts.error().message)};

@@ -16,14 +16,22 @@ bool is_stated(const sdf::ElementPtr& element, const char* outer, const char* in
 }
 
 /// What of a camera the picture does not show.
-void warn_of_camera(const sdf::Camera& source, const std::string& where, World& world) {
+void warn_of_camera(const sdf::Camera& source, sdf::SensorType type, const std::string& where, World& world) {
   const auto warn = [&](const std::string& what) {
     world.warnings.push_back(fmt::format("{} is passed over: {}", where, what));
   };
   const std::string lens = source.LensType();
-  if (const auto element = source.Element();
-      element && element->HasElement("lens") && is_stated(element, "lens", "type") && lens != "gnomonical")
+  if (lens != "gnomonical" && is_stated(source.Element(), "lens", "type")) {
     warn(fmt::format("<lens> <type> {}: the picture is that of a gnomonical lens", lens));
+  } else if (lens != "gnomonical" && type == sdf::SensorType::WIDE_ANGLE_CAMERA) {
+    warn("its wide-angle lens: the picture is that of a gnomonical lens with the same field of view");
+  }
+  if (type == sdf::SensorType::THERMAL_CAMERA || type == sdf::SensorType::SEGMENTATION_CAMERA ||
+      type == sdf::SensorType::BOUNDINGBOX_CAMERA)
+    warn("its kind of sensor: the picture is that of a camera for visible light");
+  if (!source.PoseRelativeTo().empty())
+    warn(fmt::format("relative_to '{}' of the <pose> in <camera>: it is taken relative to the sensor",
+                     source.PoseRelativeTo()));
   constexpr double kMiddle = 0.5;
   if (source.DistortionCenter() != ignition::math::Vector2d(kMiddle, kMiddle))
     warn(fmt::format("<distortion> <center> {} {}: the distortion is about the principal point",
@@ -42,9 +50,16 @@ Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_sensor, const s
     CameraSensor camera;
     camera.name = name;
     if (sensor.UpdateRate() > 0) camera.rate = sensor.UpdateRate();
-    // Gazebo's camera looks along the x axis of its frame.
+    // Gazebo's camera looks along the x axis of its frame, which its own <pose> places on the sensor.
+    const ignition::math::Pose3d& own = source->RawPose();
+    Pose T_model_camera = T_model_sensor;
+    if (own != ignition::math::Pose3d::Zero) {
+      T_model_camera = T_model_sensor *
+                       Pose{Eigen::Quaterniond(own.Rot().W(), own.Rot().X(), own.Rot().Y(), own.Rot().Z()),
+                            Eigen::Vector3d(own.Pos().X(), own.Pos().Y(), own.Pos().Z())};
+    }
     camera.T_body_camera =
-        T_model_sensor * Pose{Eigen::Quaterniond(forward_camera_rotation()), Eigen::Vector3d::Zero()};
+        T_model_camera * Pose{Eigen::Quaterniond(forward_camera_rotation()), Eigen::Vector3d::Zero()};
     if (is_stated(source->Element(), "image", "format"))
       camera.colour = source->PixelFormat() != sdf::PixelFormatType::L_INT8 &&
                       source->PixelFormat() != sdf::PixelFormatType::L_INT16;
@@ -73,7 +88,7 @@ Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_sensor, const s
     }
     if (source->ImageNoise().Type() == sdf::NoiseType::GAUSSIAN)
       camera.noise_deviation = source->ImageNoise().StdDev();
-    warn_of_camera(*source, fmt::format("{}: camera '{}'", file, name), world);
+    warn_of_camera(*source, sensor.Type(), fmt::format("{}: camera '{}'", file, name), world);
     world.cameras.push_back(std::move(camera));
   } else if (const sdf::Imu* source_imu = sensor.ImuSensor()) {
     ImuSensor imu;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <Eigen/LU>
@@ -153,6 +154,7 @@ void Builder::operator()(const Mesh& mesh) {
   const TriangleMesh& data = *mesh.triangles;
   const bool mapped = visual_.material.image && data.texture_coordinates.size() == data.vertices.size();
   const auto first = static_cast<std::uint32_t>(out_.vertices.size());
+  const double outward = mesh.scale.prod() < 0 ? -1 : 1;  // a mirror turns the order of the corners
   std::vector<Eigen::Vector3d> world(data.vertices.size());
   for (std::size_t i = 0; i < world.size(); ++i) {
     world[i] = visual_.T_world_shape * Eigen::Vector3d(mesh.scale.cwiseProduct(data.vertices[i]));
@@ -164,7 +166,7 @@ void Builder::operator()(const Mesh& mesh) {
     const Eigen::Vector3d cross = e1.cross(e2);
     if (!(cross.norm() > 1e-12)) continue;  // no area: it hides nothing
     Facet facet;
-    facet.normal = cross.normalized();
+    facet.normal = outward * cross.normalized();
     facet.offset = facet.normal.dot(world[corner[0]]);
     facet.visual = static_cast<std::int32_t>(index_);
     if (mapped) {
@@ -183,7 +185,7 @@ void Builder::operator()(const Mesh& mesh) {
       facet.texture =
           metric_frame(Eigen::Vector3d::Unit(axis == 0 ? 1 : 0), Eigen::Vector3d::Unit(axis == 2 ? 1 : 2));
     }
-    for (const std::uint32_t i : corner) out_.vertex_normals[first + i] += cross.cast<float>();
+    for (const std::uint32_t i : corner) out_.vertex_normals[first + i] += (outward * cross).cast<float>();
     out_.facets.push_back(facet);
     triangle(first + corner[0], first + corner[1], first + corner[2]);
   }
@@ -221,7 +223,30 @@ std::string complaint(const Shape& shape) {
   return std::visit(Check{}, shape);
 }
 
+/// How far a visual is from the origin: its frame, or the nearest vertex of a mesh, whose frame says nothing.
+double distance_from_origin(const Visual& visual) {
+  const auto* mesh = std::get_if<Mesh>(&visual.shape);
+  if (mesh == nullptr || mesh->triangles->vertices.empty()) return visual.T_world_shape.translation.norm();
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& v : mesh->triangles->vertices)
+    nearest = std::min(nearest, (visual.T_world_shape * Eigen::Vector3d(mesh->scale.cwiseProduct(v))).norm());
+  return nearest;
+}
+
 }  // namespace
+
+std::optional<std::string> precision_warning(const World& world) {
+  for (const Visual& visual : world.visuals) {
+    const double distance = distance_from_origin(visual);
+    if (!(distance > farthest_exact_place)) continue;
+    return fmt::format(
+        "visual '{}': found {:.0f} m from the origin of the world, where single precision makes depth "
+        "inexact "
+        "(beyond {:.0f} m): move the world to its origin",
+        visual.name, distance, farthest_exact_place);
+  }
+  return std::nullopt;
+}
 
 Result<Geometry> Geometry::from(const World& world) {
   Geometry geometry;
@@ -231,6 +256,13 @@ Result<Geometry> Geometry::from(const World& world) {
     }
     if (!visual.T_world_shape.is_finite()) {
       return Error{fmt::format("visual '{}': found a pose that is not finite", visual.name)};
+    }
+    if (const double distance = distance_from_origin(visual); !(distance <= farthest_place)) {
+      return Error{
+          fmt::format("visual '{}': found {:.0f} m from the origin of the world, expected at most {:.0f} m, "
+                      "since rays are "
+                      "of single precision: move the world to its origin",
+                      visual.name, distance, farthest_place)};
     }
   }
   for (const bool casts_shadow : {true, false}) {

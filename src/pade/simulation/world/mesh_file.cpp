@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <assimp/Importer.hpp>
@@ -52,7 +53,7 @@ std::optional<fs::path> find_image(std::string name, const fs::path& folder, con
 }
 
 Material material_of(const aiMaterial& source, const fs::path& folder, const ResourcePaths& resources,
-                     std::vector<std::string>& warnings) {
+                     TextureImages& images, std::vector<std::string>& warnings) {
   Material material;
   aiColor3D colour;
   if (source.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
@@ -63,7 +64,7 @@ Material material_of(const aiMaterial& source, const fs::path& folder, const Res
   if (source.GetTexture(aiTextureType_DIFFUSE, 0, &name) == AI_SUCCESS) {
     const auto file = find_image(name.C_Str(), folder, resources);
     auto image =
-        file ? read_texture_image(*file)
+        file ? images.read(*file)
              : Result<std::shared_ptr<const cv::Mat>>(Error{fmt::format(
                    "{}: no such texture image, neither beside the mesh nor in materials/textures nor in the "
                    "resource folders",
@@ -102,7 +103,7 @@ void centre(std::vector<std::shared_ptr<TriangleMesh>>& meshes) {
 }
 
 Result<std::vector<MeshPart>> read_submesh(const aiScene& scene, const fs::path& file, const SubMesh& part,
-                                           const ResourcePaths& resources,
+                                           const ResourcePaths& resources, TextureImages& images,
                                            std::vector<std::string>& warnings) {
   std::vector<std::pair<unsigned, aiMatrix4x4>> found;
   std::vector<std::string> names;
@@ -124,10 +125,13 @@ Result<std::vector<MeshPart>> read_submesh(const aiScene& scene, const fs::path&
                                                   static_cast<float>(v.z()));
       v = Eigen::Vector3d(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
     }
+    if (transform.Determinant() < 0) {  // a mirror turns the order of the corners
+      for (auto& corners : triangles->triangles) std::swap(corners[1], corners[2]);
+    }
     if (triangles->triangles.empty()) continue;
     meshes.push_back(triangles);
     parts.push_back({std::move(triangles), material_of(*scene.mMaterials[source.mMaterialIndex],
-                                                       file.parent_path(), resources, warnings)});
+                                                       file.parent_path(), resources, images, warnings)});
   }
   if (part.centred) centre(meshes);
   return parts;
@@ -139,18 +143,22 @@ double linear_from_srgb(double value) {
   return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
 }
 
-Result<std::shared_ptr<const cv::Mat>> read_texture_image(const std::filesystem::path& file) {
+Result<std::shared_ptr<const cv::Mat>> TextureImages::read(const fs::path& file) {
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(file, ignored)) {
+  if (!fs::is_regular_file(file, ignored)) {
     return Error{fmt::format("{}: no such texture image", file.string())};
   }
+  std::shared_ptr<const cv::Mat>& known = images_[fs::weakly_canonical(file, ignored)];
+  if (known) return known;
   auto image = io::load_image(file, io::Pixels::colour);
   if (!image) return image.error();
-  return std::shared_ptr<const cv::Mat>(std::make_shared<cv::Mat>(std::move(*image)));
+  known = std::make_shared<const cv::Mat>(std::move(*image));
+  return known;
 }
 
 Result<std::vector<MeshPart>> read_mesh(const fs::path& file, const SubMesh& part,
-                                        const ResourcePaths& resources, std::vector<std::string>& warnings) {
+                                        const ResourcePaths& resources, TextureImages& images,
+                                        std::vector<std::string>& warnings) {
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored)) return Error{fmt::format("{}: no such mesh", file.string())};
   Assimp::Importer importer;
@@ -166,7 +174,7 @@ Result<std::vector<MeshPart>> read_mesh(const fs::path& file, const SubMesh& par
                              file.string(), importer.GetErrorString())};
   }
   if (!part.name.empty()) {
-    auto parts = read_submesh(*scene, file, part, resources, warnings);
+    auto parts = read_submesh(*scene, file, part, resources, images, warnings);
     if (parts && parts->empty())
       return Error{fmt::format("{}: found no triangle in part '{}'", file.string(), part.name)};
     return parts;
@@ -176,7 +184,7 @@ Result<std::vector<MeshPart>> read_mesh(const fs::path& file, const SubMesh& par
     auto triangles = triangles_of(*scene->mMeshes[i]);
     if (triangles->triangles.empty()) continue;
     parts.push_back({std::move(triangles), material_of(*scene->mMaterials[scene->mMeshes[i]->mMaterialIndex],
-                                                       file.parent_path(), resources, warnings)});
+                                                       file.parent_path(), resources, images, warnings)});
   }
   if (parts.empty()) return Error{fmt::format("{}: found no triangle, expected at least one", file.string())};
   return parts;

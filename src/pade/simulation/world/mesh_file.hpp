@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -27,15 +29,23 @@ struct SubMesh {
   }
 };
 
+/// Images that are read once and shared, however many surfaces show them.
+class TextureImages {
+ public:
+  /// An 8-bit colour image. Refuses what is missing or no image.
+  Result<std::shared_ptr<const cv::Mat>> read(const std::filesystem::path& file);
+
+ private:
+  std::map<std::filesystem::path, std::shared_ptr<const cv::Mat>> images_;
+};
+
 /// Vertices as they stand in the file, times the unit of a COLLADA file: its up axis changes nothing, as in
 /// Gazebo. Refuses a missing or unreadable file, one without a triangle, and an unknown part. A material
 /// image is looked for where Gazebo looks: beside the file, in materials/textures beside its folder, and in
 /// the `resources`; one that cannot be read is named in `warnings`.
 Result<std::vector<MeshPart>> read_mesh(const std::filesystem::path& file, const SubMesh& part,
-                                        const ResourcePaths& resources, std::vector<std::string>& warnings);
-
-/// An 8-bit colour image. Refuses what is missing or no image.
-Result<std::shared_ptr<const cv::Mat>> read_texture_image(const std::filesystem::path& file);
+                                        const ResourcePaths& resources, TextureImages& images,
+                                        std::vector<std::string>& warnings);
 
 /// Linear reflectance of an sRGB value in [0, 1].
 double linear_from_srgb(double value);

@@ -1,6 +1,6 @@
 #include "pade/simulation/world/world_fingerprint.hpp"
 
-#include <set>
+#include <map>
 
 #include "pade/core/fingerprint.hpp"
 
@@ -29,8 +29,10 @@ class Hash : public Fingerprint {
   }
   void operator()(const Mesh& s) {
     vector(s.scale);
-    number(static_cast<double>(s.triangles->triangles.size()));
-    if (!meshes_.insert(s.triangles.get()).second) return;
+    if (!is_new(meshes_, s.triangles.get())) return;
+    for (const std::size_t count : {s.triangles->vertices.size(), s.triangles->texture_coordinates.size(),
+                                    s.triangles->triangles.size()})
+      number(static_cast<double>(count));
     for (const auto& v : s.triangles->vertices) vector(v);
     for (const auto& v : s.triangles->texture_coordinates) vector(v);
     for (const auto& t : s.triangles->triangles) bytes(t.data(), sizeof t);
@@ -40,13 +42,25 @@ class Hash : public Fingerprint {
     number(static_cast<double>(m.pattern.kind));
     number(m.pattern.scale);
     number(m.pattern.contrast);
-    if (m.image && images_.insert(m.image.get()).second)
+    if (!m.image) {
+      number(-1);
+    } else if (is_new(images_, m.image.get())) {
+      vector(Eigen::Vector3d(m.image->rows, m.image->cols, m.image->type()));
       bytes(m.image->data, m.image->total() * m.image->elemSize());
+    }
   }
 
  private:
-  std::set<const TriangleMesh*> meshes_;
-  std::set<const cv::Mat*> images_;
+  /// What was seen before is known by its number.
+  template <class Thing>
+  bool is_new(std::map<const Thing*, std::size_t>& seen, const Thing* thing) {
+    const auto [known, fresh] = seen.try_emplace(thing, seen.size());
+    number(static_cast<double>(known->second));
+    return fresh;
+  }
+
+  std::map<const TriangleMesh*, std::size_t> meshes_;
+  std::map<const cv::Mat*, std::size_t> images_;
 };
 
 }  // namespace
