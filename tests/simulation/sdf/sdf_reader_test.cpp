@@ -122,7 +122,7 @@ TEST_F(SdfReader, OfACameraSaysWhatThePictureDoesNotShow) {
 TEST_F(SdfReader, OfAWideAngleCameraSaysThatItIsDrawnAsAPinhole) {
   const auto result =
       read_sdf(world(model(kBox) +
-                     "<model name='q'><link name='l'><sensor name='c' type='wideanglecamera'><camera>"
+                     "<model name='q'><link name='l'><sensor name='c' type='wide_angle_camera'><camera>"
                      "<horizontal_fov>2</horizontal_fov><image><width>640</width><height>480</height></image>"
                      "</camera></sensor></link></model>"));
   ASSERT_TRUE(result.ok()) << message(result);
@@ -183,8 +183,10 @@ TEST_F(SdfReader, RefusesANameThatMeansTwoModels) {
 TEST_F(SdfReader, RefusesAnIncludeThatTheWorkingDirectoryWouldAnswer) {
   const std::string model_text = "<sdf version='1.9'><model name='a'><link name='l'><visual name='v'>" +
                                  std::string(kBox) + "</visual></link></model></sdf>";
-  write("models/a/model.sdf", model_text);
-  write("elsewhere/a/model.sdf", model_text);
+  for (const std::string folder : {"models", "elsewhere"}) {
+    write(folder + "/a/model.sdf", model_text);
+    write(folder + "/a/model.config", "<model><sdf version='1.9'>model.sdf</sdf></model>");
+  }
   const auto file = world("<include><uri>model://a</uri></include>");
   const auto before = std::filesystem::current_path();
   std::filesystem::current_path(folder_ / "elsewhere");
