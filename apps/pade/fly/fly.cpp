@@ -217,9 +217,10 @@ void print_totals(const ordered_json& totals) {
   };
   const ordered_json& velocity = totals["mean_goal_velocity_of_arrived_m_s"];
   fmt::print(
-      "{} flights: {} arrived, {} collided (95 % intervals); mean goal velocity of those that arrived {}; "
+      "{} {}: {} arrived, {} collided (95 % intervals); mean goal velocity of those that arrived {}; "
       "straight way free in {}\n",
-      totals["flights"].get<std::size_t>(), share("arrived"), share("collided"),
+      totals["flights"].get<std::size_t>(), totals["flights"] == 1 ? "flight" : "flights", share("arrived"),
+      share("collided"),
       velocity.is_null() ? "-" : fmt::format("{:.2f} m/s", velocity.get<double>()),
       totals["straight_way_is_free"]["flights"].get<std::size_t>());
 }
