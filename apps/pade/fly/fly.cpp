@@ -220,8 +220,7 @@ void print_totals(const ordered_json& totals) {
       "{} {}: {} arrived, {} collided (95 % intervals); mean goal velocity of those that arrived {}; "
       "straight way free in {}\n",
       totals["flights"].get<std::size_t>(), totals["flights"] == 1 ? "flight" : "flights", share("arrived"),
-      share("collided"),
-      velocity.is_null() ? "-" : fmt::format("{:.2f} m/s", velocity.get<double>()),
+      share("collided"), velocity.is_null() ? "-" : fmt::format("{:.2f} m/s", velocity.get<double>()),
       totals["straight_way_is_free"]["flights"].get<std::size_t>());
 }
 
