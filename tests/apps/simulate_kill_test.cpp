@@ -38,7 +38,7 @@ constexpr const char* kFlight = R"(waypoints:
   - {position: [8, 0.4, 1.7], yaw_deg: 4}
   - {position: [18, 0, 1.5]}
 frames: 60
-camera: {width: 320, height: 240, fx: 277, fy: 277, cx: 159.5, cy: 119.5}
+camera: {width: 640, height: 480, fx: 554, fy: 554, cx: 319.5, cy: 239.5}
 )";
 
 std::map<std::string, std::string> contents(const fs::path& folder) {
@@ -99,7 +99,7 @@ TEST_F(KilledSimulation, TenTimesAtRandomMomentsGoesOnToTheSameBytes) {
   const fs::path out = folder_ / "cut";
   const fs::path unfinished = folder_ / ".cut.unfinished";
   std::mt19937 random(2026);
-  std::uniform_real_distribution<double> moment(0.1, 0.6);  // of a whole run; starting up takes two fifths of it
+  std::uniform_real_distribution<double> moment(0.1, 0.35);  // of a whole run; starting up takes a fifth of it
   int killed = 0;
   std::size_t most_finished = 0;
   std::map<std::string, fs::file_time_type> finished;
