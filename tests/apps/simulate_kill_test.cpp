@@ -99,7 +99,8 @@ TEST_F(KilledSimulation, TenTimesAtRandomMomentsGoesOnToTheSameBytes) {
   const fs::path out = folder_ / "cut";
   const fs::path unfinished = folder_ / ".cut.unfinished";
   std::mt19937 random(2026);
-  std::uniform_real_distribution<double> moment(0.08, 0.26);  // of a whole run; starting up takes a sixth of it
+  std::uniform_real_distribution<double> moment(0.08,
+                                                0.26);  // of a whole run; starting up takes a sixth of it
   int killed = 0;
   std::size_t most_finished = 0;
   std::map<std::string, fs::file_time_type> finished;
