@@ -288,6 +288,27 @@ TEST(LocalPlanner, ClimbsNoFasterThanItsMotionsWhateverTheAngleOfTheNose) {
   }
 }
 
+/// A goal higher or lower than it may fly, as satellites may say, is reached where it is nearest to it.
+TEST(LocalPlanner, ArrivesBelowAGoalThatIsTooHighAndAboveOneThatIsTooLow) {
+  const Balls space;
+  for (const double height : {-3.0, 0.2, 4.5, 9.0}) {
+    LocalPlanner planner = planner_of();
+    const Vector3d goal(12, 0, height);
+    std::vector<MotionState> motion = {at_rest({0, 0, 1.6})};
+    PlanKind kind = PlanKind::committed;
+    double time = 0;
+    for (; time < 20 && kind != PlanKind::arrived; time += 0.1) {
+      const MotionState state = state_at(motion, time + 0.1);
+      const LocalPlan& plan = planner.plan(state, goal, space, unseen_window(state.position));
+      motion = plan.motion;
+      kind = plan.kind;
+    }
+    EXPECT_EQ(kind, PlanKind::arrived) << height;
+    EXPECT_NEAR(motion.front().position.z(), std::clamp(height, 0.7, 2.8), 1.0) << height;
+    EXPECT_LT((motion.front().position - goal).head<2>().norm(), 1.0) << height;
+  }
+}
+
 /// A bigger ball is planned for when the pose is uncertain, and more slowly.
 TEST(LocalPlanner, TheMarginGrowsWithSigma) {
   Balls space;

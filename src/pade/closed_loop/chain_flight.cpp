@@ -387,7 +387,8 @@ void ChainLoop::look_at_passer_by() {
 }
 
 bool ChainLoop::believes_itself_there() const {
-  return planning::is_at(T_map_world_ * goal_, vehicle_.believed().translation, options_.planner.arrival);
+  return planning::is_at(planner_->attainable(T_map_world_ * goal_), vehicle_.believed().translation,
+                         options_.planner.arrival);
 }
 
 /// False if it touches something or believes itself at the goal.

@@ -388,8 +388,14 @@ const LocalPlan& LocalPlanner::stop(const MotionState& from, const FreeSpace& sp
   return plan_;
 }
 
-const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& goal, const FreeSpace& space,
+Vector3d LocalPlanner::attainable(const Vector3d& goal) const {
+  const VehicleLimits& limits = options_.vehicle;
+  return {goal.x(), goal.y(), std::clamp(goal.z(), limits.lowest, limits.highest)};
+}
+
+const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& wanted, const FreeSpace& space,
                                     const LocalWindow& window, const PlaceDoubt& doubt) {
+  const Vector3d goal = attainable(wanted);
   const Task task{{from, space}, goal, window};
   begin(task, doubt);
   plan_.free_reach = free_reach(task);

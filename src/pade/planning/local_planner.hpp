@@ -48,12 +48,16 @@ class LocalPlanner {
   /// Refuses options that make no sense.
   static Result<LocalPlanner> create(const LocalPlannerOptions& options = {});
 
+  /// The goal, or the place above or below it that is nearest to it in height where the vehicle may fly: as
+  /// far as a goal is only as high as the satellites say, it may be believed anywhere. World, m.
+  [[nodiscard]] Eigen::Vector3d attainable(const Eigen::Vector3d& goal) const;
+
   /// @param from    the state in which the vehicle will be when the plan takes effect
-  /// @param goal    world, m
+  /// @param wanted  the goal, world, m; attainable() of it is flown to
   /// @param space   what is free
   /// @param window  the same map about the vehicle: where obstacles are, to find a way around
   /// @return valid until the next call
-  const LocalPlan& plan(const MotionState& from, const Eigen::Vector3d& goal, const FreeSpace& space,
+  const LocalPlan& plan(const MotionState& from, const Eigen::Vector3d& wanted, const FreeSpace& space,
                         const LocalWindow& window, const PlaceDoubt& doubt = {});
 
   /// A standstill, for who sees nothing any more: braking at once, or what is left of the last plan where
