@@ -116,7 +116,8 @@ Status convert_video(const VideoConversion& conversion) {
   if (!camera) return camera.error();
   std::string why;
   const auto video = (*library)->open({conversion.in, false, 0, nullptr, nullptr}, why);
-  if (video == nullptr) return Error{fmt::format("{}: {}, expected a video", conversion.in, why)};
+  if (video == nullptr)
+    return Error{fmt::format("{}: expected a video that can be read: {}", conversion.in, why)};
   Frames frames;
   if (const Status status = write_frames(*video, conversion, *camera, *folder, frames); !status)
     return status;

@@ -47,6 +47,38 @@ TEST(VideoClock, AStampThatJumpsBeginsAnew) {
   EXPECT_NEAR(time->seconds(), 103.24, 1e-3);
 }
 
+/// Every fifth frame has the stamp of the one before, as some senders repeat them: it is left out, and no
+/// more.
+TEST(VideoClock, RepeatedStampsCostTheirFramesAlone) {
+  VideoClock clock;
+  int given = 0;
+  for (int i = 0; i < 200; ++i) {
+    const double stamp = (i % 5 == 4 ? i - 1 : i) / 20.0;
+    const auto time = clock.time_of(50 + stamp, Time::from_seconds(1000 + i / 20.0 + 0.04));
+    if (!time) continue;
+    ++given;
+    EXPECT_NEAR(time->seconds(), 1000 + stamp + 0.04, 1e-6);
+  }
+  EXPECT_GE(given, 200 * 4 / 5 - 11);
+}
+
+/// A sender that counts its nominal rate while it makes fewer frames: its clock is found again and again.
+TEST(VideoClock, AClockThatDoesNotKeepUpIsFoundAgain) {
+  VideoClock clock;
+  double worst = 0;
+  int given = 0;
+  for (int i = 0; i < 1200; ++i) {
+    const double arrived = 1000 + i / 16.0;
+    const auto time = clock.time_of(i / 20.0, Time::from_seconds(arrived));
+    if (!time) continue;
+    ++given;
+    worst = std::max(worst, arrived - time->seconds());
+  }
+  EXPECT_GT(given, 1000);
+  EXPECT_GT(worst, 1);
+  EXPECT_LT(worst, 3.5) << "1 s until it counts as late, and a fifth of ten seconds";
+}
+
 /// When frames arrive that are taken ten times a second, over a link that takes some time for each.
 class Link {
  public:
