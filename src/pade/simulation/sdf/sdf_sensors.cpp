@@ -88,7 +88,8 @@ Status add_sensor(const sdf::Sensor& sensor, const Pose& T_model_sensor, const s
     }
     if (source->ImageNoise().Type() == sdf::NoiseType::GAUSSIAN)
       camera.noise_deviation = source->ImageNoise().StdDev();
-    warn_of_camera(*source, sensor.Type(), fmt::format("{}: camera '{}'", file, name), world);
+    if (world.cameras.empty())  // the others make no picture
+      warn_of_camera(*source, sensor.Type(), fmt::format("{}: camera '{}'", file, name), world);
     world.cameras.push_back(std::move(camera));
   } else if (const sdf::Imu* source_imu = sensor.ImuSensor()) {
     ImuSensor imu;
