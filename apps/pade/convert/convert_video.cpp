@@ -117,7 +117,7 @@ Status convert_video(const VideoConversion& conversion) {
   std::string why;
   const auto video = (*library)->open({conversion.in, false, 0, nullptr, nullptr}, why);
   if (video == nullptr)
-    return Error{fmt::format("{}: expected a video that can be read: {}", conversion.in, why)};
+    return Error{fmt::format("{}: {}; expected a video that can be read", conversion.in, why)};
   Frames frames;
   if (const Status status = write_frames(*video, conversion, *camera, *folder, frames); !status)
     return status;

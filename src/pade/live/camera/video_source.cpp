@@ -183,7 +183,7 @@ Result<std::unique_ptr<FrameSource>> open_video_file(const VideoModule& library,
                                                      const Camera& camera) {
   std::string why;
   auto video = library.open({name, false, 0, nullptr, nullptr}, why);
-  if (video == nullptr) return Error{fmt::format("{}: expected a video that can be read: {}", name, why)};
+  if (video == nullptr) return Error{fmt::format("{}: {}; expected a video that can be read", name, why)};
   VideoFrame first;
   Video::Read read = Video::Read::unusable;
   while (read == Video::Read::unusable) read = video->next(first);
