@@ -22,7 +22,7 @@ namespace pade::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace closed_loop;
+using namespace closed_loop;  // NOLINT: the file is about nothing else
 using Eigen::Vector3d;
 using nlohmann::ordered_json;
 

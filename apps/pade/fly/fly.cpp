@@ -56,7 +56,7 @@ struct FlyArguments {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-using namespace closed_loop;
+using namespace closed_loop;  // NOLINT: the file is about nothing else
 
 /// "7" or "101-150".
 Result<std::vector<std::uint64_t>> parse_seeds(const std::string& text) {
