@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include "pade/io/atomic_output.hpp"
 #include "pade/io/formats/map_files.hpp"
 #include "pade/io/recording/messages/display_messages.hpp"
+#include "pade/io/run/run_info.hpp"
 #include "pade/live/camera/folder_source.hpp"
 #include "pade/mapping/query/map_view.hpp"
 #include "pade/mapping/tiles/voxel_code.hpp"
@@ -40,13 +40,6 @@ constexpr std::array kPublished = {
 std::string octomap(const io::MessageHeader& header, const mapping::MapView& view, io::MapFormat format) {
   const std::string file = io::bytes_of(io::encode_map(view, format));
   return io::write_octomap(header, file, view.voxel(), format == io::MapFormat::bt);
-}
-
-/// That this thread has used.
-double own_processor_seconds() {
-  timespec used{};
-  (void)::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
-  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
 }
 
 /// The centres of the occupied voxels.
@@ -226,11 +219,11 @@ void DdsSink::publish_map(Time now) {
   };
   const auto next = std::find_if(maps_.begin(), maps_.end(), due);
   if (newest.version == 0 || next == maps_.end()) return;
-  const double begun = own_processor_seconds();
+  const double begun = io::thread_cpu_seconds();
   if (next->writer->write(map_message(next->kind, newest))) next->sent = newest.version;
   // A large map may take a tenth of a processor at most.
   constexpr double kShare = 10;
-  const double pause = std::max(options_.map_period, kShare * (own_processor_seconds() - begun));
+  const double pause = std::max(options_.map_period, kShare * (io::thread_cpu_seconds() - begun));
   next->next = {now.nanoseconds + static_cast<std::int64_t>(pause * 1e9)};
   // The others have their turn before it.
   std::rotate(next, next + 1, maps_.end());
