@@ -136,6 +136,39 @@ TEST(Footing, AGapIsFilledFromBothSides) {
   EXPECT_NEAR(view.image.bound.at<float>(30, 75), view.image.bound.at<float>(30, 60), 0.1);
 }
 
+/// Close before a blank wall the ground is out of view, and what else has texture is noise or a stone at one
+/// side.
+TEST(Footing, AFewColumnsDoNotSpeakForAWholeImage) {
+  View view = looking(1.5);  // no ground in view
+  const auto textured = static_cast<int>(DepthState::measured);
+  const cv::Rect stone(40, 100, 20, 20);
+  view.image.state(stone) = textured;
+  view.image.bound(stone) = 9.0F;
+  bound_by_footing(view.image, view.camera, kUp, kFar);
+  for (int v = 0; v < view.camera.height; ++v) {
+    for (int u = 0; u < view.camera.width; ++u) {
+      if (u < stone.x - 16 || u >= stone.x + stone.width + 16)
+        ASSERT_FALSE(view.image.bound.at<float>(v, u) > 0) << v << ' ' << u;
+    }
+  }
+}
+
+TEST(Footing, SpecksOfNoiseCarryNothing) {
+  View view = looking(1.5);
+  Random random(1);
+  for (int v = 0; v < view.camera.height; ++v) {
+    for (int u = 0; u < view.camera.width; ++u) {
+      if (random.uniform() > 0.1) continue;
+      view.image.state.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(DepthState::low_parallax);
+      view.image.bound.at<float>(v, u) = 9.0F;
+    }
+  }
+  const cv::Mat before = view.image.bound.clone();
+  bound_by_footing(view.image, view.camera, kUp, kFar);
+  const int bounded = cv::countNonZero(before > 0);
+  EXPECT_LT(cv::countNonZero(view.image.bound > 0) - bounded, 0.02 * static_cast<double>(before.total()));
+}
+
 TEST(Footing, WhereTheFootIsOutOfViewNothingIsKnown) {
   View view = looking(6);
   view.image.state = static_cast<std::uint8_t>(DepthState::no_texture);  // also the ground

@@ -75,6 +75,25 @@ TEST(ViewsDepth, WhatTheMotionsErrIsCommonToThePixelsAndShortensTheirBounds) {
   EXPECT_NEAR(far.bound(), kScale / (20 + options.bound_sigmas * std::hypot(1, 0.02 * 20)), 1e-3);
 }
 
+/// Where no pixel around has texture, what the pair took for some was noise, and so is its bound.
+TEST(ViewsDepth, WithoutTextureTheBoundOfThePairGoesToo) {
+  for (const DepthState before :
+       {DepthState::measured, DepthState::low_parallax, DepthState::far, DepthState::epipole}) {
+    Pixel p(before, 20, 100);
+    p.image.bound = cv::Scalar(12);
+    p.field.texture = cv::Scalar(0);
+    p.read();
+    EXPECT_EQ(p.state(), code(DepthState::no_texture));
+    EXPECT_TRUE(std::isnan(p.bound()));
+    EXPECT_TRUE(std::isnan(p.z()));
+  }
+  Pixel unseen(DepthState::low_parallax, 20, 0, 0);  // by any view: the pair is all there is
+  unseen.image.bound = cv::Scalar(12);
+  unseen.field.texture = cv::Scalar(0);
+  unseen.read();
+  EXPECT_FLOAT_EQ(unseen.bound(), 12);
+}
+
 /// What the texture around shows lies at another depth: the pixel's own is as uncertain as the two differ.
 TEST(ViewsDepth, DepthFromTextureAtAnotherDepthIsUncertain) {
   Pixel p(DepthState::measured, 125, 100);

@@ -106,6 +106,31 @@ TEST(MultiView, LongerBaselinesAreMorePrecise) {
   EXPECT_LT(error({1, 2, 4}), 0.45 * one);
 }
 
+/// A wall without texture, seen with noise: as often as noise may look like faint texture, it counts only
+/// beside what has plain one.
+TEST(MultiView, NoiseAloneIsNoTexture) {
+  for (const double noise : {1.0, 2.0, 4.0}) {
+    std::vector<cv::Mat> images;
+    for (std::uint64_t i = 0; i < 4; ++i) {
+      cv::Mat image = seen(kWall, static_cast<double>(i), noise, 10 + i);
+      Random random(20 + i);
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < 120; ++x)
+          image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(128.4 + noise * random.normal());
+      }
+      images.push_back(image);
+    }
+    std::vector<View> views(3);
+    for (std::size_t i = 0; i < views.size(); ++i)
+      views[i] = {images[i + 1], {}, {static_cast<float>(-1.0 - static_cast<double>(i)), 0, 0}};
+    MultiViewEstimator estimator;
+    const ParallaxField& field = estimator.estimate(images[0], views, constant(2.5), noise);
+    EXPECT_EQ(cv::countNonZero(field.texture(cv::Rect(0, 0, 80, kHeight)) > 0), 0) << noise;
+    const cv::Mat on = field.texture(cv::Rect(130, 10, 60, kHeight - 20));
+    EXPECT_GT(cv::countNonZero(on > 1.6F), 0.9 * static_cast<double>(on.total())) << noise;
+  }
+}
+
 /// Monte-Carlo: errors of the smoothed field are no larger than the information says, nor much smaller; and
 /// information falls with the square of the noise.
 TEST(MultiView, InformationIsTheInverseOfTheVariance) {

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kFirst = 12;  // pixels with texture that are asked
 constexpr std::size_t kFewest = 3;  // of them that have to answer, and half of them
+constexpr std::size_t kSparse = 3;  // one of so many on the way down has texture, or it is specks of noise
 constexpr double kSteepest = 0.5;   // least share of up that is upward in the image: 60 degrees
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
@@ -67,40 +68,50 @@ float Columns::footing(cv::Point p) const {
   std::array<float, kFirst> bounds{};
   std::size_t answers = 0;
   std::size_t asked = 0;
-  for (; asked < bounds.size() && holds(p); p = below(p.x, p.y)) {
+  std::size_t passed = 0;
+  for (; asked < bounds.size() && passed < kSparse * kFirst && holds(p); p = below(p.x, p.y)) {
+    ++passed;
     if (is_blank(p)) continue;
     ++asked;
     const float bound = image_.bound.at<float>(p);
     const float at = bound * ahead(ray(p.x, p.y));
     if (at > 0) bounds[answers++] = at;
   }
-  if (answers < kFewest || 2 * answers < asked) return kNone;
+  if (answers < kFewest || 2 * answers < asked || kSparse * asked < passed) return kNone;
   auto* const low = bounds.data() + answers / 4;  // edges and wrong matches make single bounds small
   std::nth_element(bounds.data(), low, bounds.data() + answers);
   return *low;
 }
 
 /// A patch without texture is one surface: what is not known of a column of it is no nearer than the known
-/// ones to both sides.
-void fill_gaps(float* footing, const std::uint8_t* state, int width) {
-  constexpr int kRim = 16;  // px that one known side may answer for
+/// ones to both sides, and beside the last of them as that one. A few columns do not speak for a whole image:
+/// as many more as there are, to one side half of that.
+void fill_gaps(const float* known, const std::uint8_t* state, int width, float* filled) {
+  constexpr int kRim = 16;  // px that any known column may answer for
   const auto is_blank = [&](int u) { return state[u] == static_cast<std::uint8_t>(DepthState::no_texture); };
+  std::copy(known, known + width, filled);
   int u = 0;
   while (u < width) {
     if (!is_blank(u)) {
       ++u;
       continue;
     }
-    int last = -1;  // known column of this run
     int end = u;
-    for (; end < width && is_blank(end); ++end) {
-      if (!(footing[end] > 0)) continue;
-      const int first = last < 0 ? std::max(u, end - kRim) : last + 1;
-      const float least = last < 0 ? footing[end] : std::min(footing[last], footing[end]);
-      std::fill(footing + first, footing + end, least);
-      last = end;
+    for (; end < width && is_blank(end); ++end) continue;
+    const auto columns =
+        static_cast<int>(std::count_if(known + u, known + end, [](float at) { return at > 0; }));
+    const int rim = std::max(kRim, columns / 2);
+    int last = -1;  // known column of this run
+    for (int i = u; i < end && columns > 0; ++i) {
+      if (!(known[i] > 0)) continue;
+      if (last < 0) {
+        std::fill(filled + std::max(u, i - rim), filled + i, known[i]);
+      } else if (i - last <= 2 * rim) {
+        std::fill(filled + last + 1, filled + i, std::min(known[last], known[i]));
+      }
+      last = i;
     }
-    if (last >= 0) std::fill(footing + last + 1, footing + std::min(end, last + 1 + kRim), footing[last]);
+    if (last >= 0) std::fill(filled + last + 1, filled + std::min(end, last + 1 + rim), known[last]);
     u = end;
   }
 }
@@ -120,6 +131,7 @@ void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vect
   const int width = image.bound.cols;
   std::vector<float> footing;  // of the row below
   std::vector<float> found;
+  std::vector<float> filled(static_cast<std::size_t>(width));
   for (int v = image.bound.rows - 1; v >= 0; --v) {
     std::swap(footing, found);
     found.assign(static_cast<std::size_t>(width), kNone);
@@ -129,9 +141,9 @@ void bound_by_footing(DepthImage& image, const Camera& camera, const Eigen::Vect
       found[static_cast<std::size_t>(u)] =
           columns.is_blank(below) ? footing[static_cast<std::size_t>(below.x)] : columns.footing(below);
     }
-    fill_gaps(found.data(), image.state.ptr<std::uint8_t>(v), width);
+    fill_gaps(found.data(), image.state.ptr<std::uint8_t>(v), width, filled.data());
     for (int u = 0; u < width; ++u) {
-      const float at = found[static_cast<std::size_t>(u)];
+      const float at = filled[static_cast<std::size_t>(u)];
       if (!(at > 0)) continue;
       const Eigen::Vector3d ray = columns.ray(u, v);
       const float ahead = columns.ahead(ray);

@@ -98,7 +98,9 @@ PADE_INLINE void read(const ReadParameters& p, const ReadField& f, int width, in
   const V shared = p.scale2 * common_error(p, f.common + u, width, some, positive * p.per_scale);
   const V bound = p.scale / (positive + p.bound_sigmas * sqrt(sigma2 + shared));
   some.put(row.of_views + u, select(told, bound, set(__builtin_inff())));
-  V known = some.get(row.bound + u);
+  // Where no pixel around has plain texture, that of the pair was noise too.
+  const I blank = seen & I(matching > 0.0F) & I(texture == 0.0F);
+  V known = select(blank, nan, some.get(row.bound + u));
   known = select(told & ~I(known >= bound), bound, known);
   some.put(row.bound + u, known);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 
@@ -27,6 +28,8 @@ constexpr int kCostWindow = 3;
 constexpr float kClearly = 0.25F;      // grey values
 constexpr int kNoiseWindow = 31;       // px
 constexpr float kLeastNoise2 = 0.09F;  // grey values squared: that of rounding
+constexpr int kPlainCell = 16;         // px
+constexpr float kPlain = 9;            // squared slopes, in those of noise, that noise does not reach
 constexpr float kSame = 0.1F;          // px
 constexpr float kUnseen = 1e3F;        // cost where no view sees a pixel
 
@@ -43,6 +46,40 @@ ViewGeometry geometry(const View& view, const MultiViewOptions& options) {
 cv::Mat header(const Plane& plane) {
   return {plane.height(), plane.width(), CV_32FC1, plane.data(),
           static_cast<std::size_t>(plane.stride()) * sizeof(float)};
+}
+
+/// Of noise alone a third of an image may seem to have faint texture. It counts only near plain one (Canny's
+/// hysteresis, by cells): elsewhere there is none.
+void keep_near_plain(Plane& texture) {
+  const int columns = (texture.width() + kPlainCell - 1) / kPlainCell;
+  const int rows = (texture.height() + kPlainCell - 1) / kPlainCell;
+  cv::Mat plain = cv::Mat::zeros(rows, columns, CV_8UC1);
+  std::vector<float> most(static_cast<std::size_t>(columns) * kPlainCell);
+  for (int row = 0; row < rows; ++row) {
+    std::fill(most.begin(), most.end(), 0.0F);
+    const int end = std::min((row + 1) * kPlainCell, texture.height());
+    for (int y = row * kPlainCell; y < end; ++y) {
+      const float* line = texture.row(y);
+      for (int x = 0; x < texture.width(); ++x) {
+        float& so_far = most[static_cast<std::size_t>(x)];
+        so_far = std::max(so_far, line[x]);
+      }
+    }
+    for (int column = 0; column < columns; ++column) {
+      const auto cell = most.begin() + static_cast<std::ptrdiff_t>(column) * kPlainCell;
+      plain.at<std::uint8_t>(row, column) = *std::max_element(cell, cell + kPlainCell) > kPlain ? 255 : 0;
+    }
+  }
+  cv::Mat near;
+  cv::dilate(plain, near, cv::Mat());
+  for (int y = 0; y < texture.height(); ++y) {
+    const auto* cells = near.ptr<std::uint8_t>(y / kPlainCell);
+    for (int column = 0; column < columns; ++column) {
+      if (cells[column] != 0) continue;
+      const int first = column * kPlainCell;
+      std::fill(texture.row(y) + first, texture.row(y) + std::min(first + kPlainCell, texture.width()), 0.0F);
+    }
+  }
 }
 
 }  // namespace
@@ -277,6 +314,7 @@ void MultiViewEstimator::find_texture(float noise) {
     float* texture = b.texture.row(y);
     for (int x = 0; x < b.distance.width(); ++x) texture[x] /= std::max(noise2[x], kLeastNoise2);
   }
+  keep_near_plain(b.texture);
 }
 
 const ParallaxField& MultiViewEstimator::estimate(const cv::Mat& reference, const std::vector<View>& views,
