@@ -26,7 +26,7 @@ struct ParallaxField {
   cv::Mat offset;  ///< d of the texture that this was read from, around a pixel, beyond the pixel's own
   cv::Mat matching;  ///< number of views whose match is right, as far as the images tell
   cv::Mat texture;   ///< squared slopes of the image along the parallax, in those of the noise around; noise
-                     ///< alone: .9
+                     ///< alone: about 1, and 0 where no pixel around has more than noise may have
 
   /// True of a field without pixels: nothing was estimated.
   [[nodiscard]] bool empty() const { return distance.empty(); }
