@@ -245,6 +245,7 @@ void read_pixel(const ParallaxField& field, int u, int v, const CommonError& com
   for (const DepthState blind : {DepthState::inconsistent, DepthState::out_of_view, DepthState::no_texture}) {
     if (state == code(blind)) return;
   }
+  if (at(field.matching) > 0 && at(field.texture) == 0) bound = kNan;
   if (!(at(field.information) > 0) || !(at(field.texture) > 1.6F)) {
     if (at(field.matching) > 0) drop(DepthState::no_texture);
     return;

@@ -6,6 +6,9 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <octomap/OcTree.h>
+
+#include "pade/planning/map_space.hpp"
 
 namespace pade::planning {
 namespace {
@@ -404,6 +407,42 @@ TEST(LocalPlanner, BacksOffWhereItsHopsOpenNothing) {
   EXPECT_GT(rim, 0.7);
   EXPECT_GT(back, 1.5);
   EXPECT_GT(aside_there, 0.2);  // the baseline of its look from there
+}
+
+/// A wall 6 m wide that nothing is ever seen of, as one without texture: the way straight on stays the
+/// shortest, and is given up for one around it.
+TEST(LocalPlanner, GoesAroundWhatItNeverSees) {
+  auto tree = std::make_unique<octomap::OcTree>(0.1);
+  for (int x = -40; x < 120; ++x) {
+    for (int y = -70; y < 70; ++y) {
+      const bool hidden = x >= 30 && x < 60 && std::abs(y) < 30;
+      for (int z = 3; z < 33 && !hidden; ++z)
+        tree->updateNode(
+            octomap::OcTreeKey(static_cast<std::uint16_t>(32768 + x), static_cast<std::uint16_t>(32768 + y),
+                               static_cast<std::uint16_t>(32768 + z)),
+            false, true);
+    }
+  }
+  tree->updateInnerOccupancy();
+  const auto map = mapping::OccupancyMap::create({}, std::move(tree));
+  ASSERT_TRUE(map.ok());
+  const auto view = mapping::MapView::of(*map);
+  const MapSpace space(view);
+  LocalPlanner planner = planner_of();
+  LocalWindow window;
+  MotionState state = at_rest({0, 0, 1.6});
+  const Vector3d goal(10, 0, 1.6);
+  double nearest = kInfinity;  // to the hidden space
+  int frame = 0;
+  for (; frame < 900 && !is_at(goal, state.position, 1); ++frame) {
+    window.set(*view, state.position, planner.radius());
+    const LocalPlan& plan = planner.plan(state, goal, space, window);
+    state = state_at(plan.motion, state.time + 0.1);
+    const Vector3d beside = (state.position - Vector3d(4.5, 0, 0)).cwiseAbs() - Vector3d(1.5, 3, 0);
+    nearest = std::min(nearest, std::hypot(std::max(beside.x(), 0.0), std::max(beside.y(), 0.0)));
+  }
+  EXPECT_LT(frame, 900);
+  EXPECT_GT(nearest, 0.35);
 }
 
 }  // namespace

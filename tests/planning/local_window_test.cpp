@@ -125,6 +125,27 @@ TEST(LocalGuide, LeadsStraightWhereNothingStandsAndAroundAWall) {
   EXPECT_GT(guide.to_go({0, 0, 1.6}), 4 * 1.5 + 6 + 0.5);
 }
 
+/// Unseen space costs half as much again as seen space, and where it was given up so much that a way around
+/// is taken.
+TEST(LocalGuide, LeadsAroundWhatWasGivenUp) {
+  const auto map = mapping::OccupancyMap::create();
+  const std::array sides = {Vector3d(2, -3, 1.6), Vector3d(2, 3, 1.6)};
+  LocalWindow window({6.4, 6.4, 1.6});
+  window.set(*mapping::MapView::of(*map)->flown(sides, 0.6), {0, 0, 1.6}, 0.4);
+  LocalGuide guide;
+  const LocalGuide::Heights heights{0.7, 2.8};
+  const Vector3d goal(5, 0, 1.6);
+  guide.set(window, goal, heights);
+  const double straight = guide.to_go({0, 0, 1.6});
+  EXPECT_NEAR(straight, 5 * 1.5, 0.4);
+  const std::array hidden = {HiddenSpace{{2, 0, 0}, 1}};
+  guide.set(window, goal, heights, 0, hidden);
+  EXPECT_GT(guide.to_go({0, 0, 1.6}), straight + 0.3);
+  EXPECT_LT(guide.to_go({0, 0, 1.6}),
+            straight + 3);  // around, and not through two metres at six times the price
+  EXPECT_NEAR(guide.to_go({4, 0, 1.6}), 1.5, 0.2);  // beyond it nothing has changed
+}
+
 /// Something 40 cm or 2.4 m wide stands at the goal, or a wall all around it. That used to leave no way at
 /// all.
 TEST(LocalGuide, LeadsTowardAGoalThatIsBlocked) {

@@ -16,6 +16,7 @@ constexpr double kPerMetre = 100;    // costs count centimetres
 constexpr std::uint8_t kSeen = 10;   // prices, in tenths
 constexpr std::uint8_t kTight = 13;  // something is near
 constexpr std::uint8_t kUnseen = 15;
+constexpr std::uint8_t kHidden = 60;
 constexpr double kAbout = 3;              // from a goal that is not to be reached, m
 constexpr double kHeightOfArrival = 0.5;  // m
 constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
@@ -63,14 +64,20 @@ void LocalGuide::lay_out(const LocalWindow& window, const Heights& heights) {
   for (auto& bucket : queue_) bucket.clear();
 }
 
-void LocalGuide::price(const LocalWindow& window) {
+void LocalGuide::price(const LocalWindow& window, std::span<const HiddenSpace> hidden) {
+  const auto unseen = [&](const Vector3d& at) {
+    const bool is_hidden = std::any_of(hidden.begin(), hidden.end(), [&](const HiddenSpace& space) {
+      return (at - space.centre).head<2>().norm() < space.radius;
+    });
+    return is_hidden ? kHidden : kUnseen;
+  };
   std::size_t cell = 0;
   for (int z = 0; z < size_.z(); ++z) {
     for (int y = 0; y < size_.y(); ++y) {
       for (int x = 0; x < size_.x(); ++x, ++cell) {
         const Vector3d centre = centre_of(x, y, z);
         if (!window.is_clear(centre)) continue;
-        price_[cell] = window.is_free(centre) ? kSeen : kUnseen;
+        price_[cell] = window.is_free(centre) ? kSeen : unseen(centre);
       }
     }
   }
@@ -171,10 +178,10 @@ void LocalGuide::walk() {
   }
 }
 
-void LocalGuide::set(const LocalWindow& window, const Vector3d& goal, const Heights& heights,
-                     double arrival) {
+void LocalGuide::set(const LocalWindow& window, const Vector3d& goal, const Heights& heights, double arrival,
+                     std::span<const HiddenSpace> hidden) {
   lay_out(window, heights);
-  price(window);
+  price(window, hidden);
   start_from(goal, arrival);
   walk();
   if (reaches_the_middle()) return;

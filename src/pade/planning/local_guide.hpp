@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -13,6 +14,13 @@ namespace pade::planning {
 /// Whether a place counts as the goal: horizontally nearer than `arrival` (m), and in height nearer than that
 /// or 0.5 m.
 bool is_at(const Eigen::Vector3d& goal, const Eigen::Vector3d& place, double arrival);
+
+/// Space that stays unseen from wherever it is looked at, such as that behind a wall without texture: all
+/// heights within `radius` (m) of `centre` (world, m).
+struct HiddenSpace {
+  Eigen::Vector3d centre;
+  double radius;
+};
 
 /// Shortest ways (Dijkstra's, over cells of 0.2 m x 0.2 m x 0.4 m) from the window about the vehicle to the
 /// goal. What has not been seen may be flown through at a price; beyond the window the way is straight.
@@ -27,8 +35,9 @@ class LocalGuide {
   /// of the ways to the places nearest to it; where no way leads from there to the middle of the window, of
   /// those out of the window.
   /// @param arrival  horizontally as near to the goal is there, m
-  void set(const LocalWindow& window, const Eigen::Vector3d& goal, const Heights& heights,
-           double arrival = 0);
+  /// @param hidden   where what has not been seen has a much higher price
+  void set(const LocalWindow& window, const Eigen::Vector3d& goal, const Heights& heights, double arrival = 0,
+           std::span<const HiddenSpace> hidden = {});
 
   /// Length of the way from a point, m, unseen parts counted more; infinity where none is known, and beyond
   /// the window.
@@ -37,7 +46,7 @@ class LocalGuide {
  private:
   using Index = std::uint32_t;
   void lay_out(const LocalWindow& window, const Heights& heights);
-  void price(const LocalWindow& window);
+  void price(const LocalWindow& window, std::span<const HiddenSpace> hidden);
   void start_from(const Eigen::Vector3d& goal, double arrival);
   bool start_about(const Eigen::Vector3d& goal, double arrival);
   void start_from_sides(const Eigen::Vector3d& goal);

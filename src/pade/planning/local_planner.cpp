@@ -244,6 +244,7 @@ bool LocalPlanner::try_hop(const Task& task, const MotionCommand& command, doubl
 /// epipole.
 bool LocalPlanner::hop(const Task& task) {
   if (is_stuck_here(task)) {
+    give_up_what_is_ahead(task);
     retreat_ = Retreat::turning;
     if (goes_on_retreating(task)) return true;
   }
@@ -272,6 +273,28 @@ bool LocalPlanner::is_stuck_here(const Task& task) {
     hops_here_ = 0;
   }
   return ++hops_here_ % kHopsBeforeRetreat == 0;
+}
+
+/// What lies on the way on and has not been seen by now may never be, such as what is behind a wall without
+/// texture: another way is tried before it. Where that is one that was given up before, more of it is.
+void LocalPlanner::give_up_what_is_ahead(const Task& task) {
+  constexpr double kRadius = 1.5;  // m, of the first
+  constexpr int kGrowths = 3;      // to so many times that
+  constexpr double kNextTo = 4;    // m
+  constexpr std::size_t kMost = 32;
+  const Vector3d ahead = nose(best_heading(task));
+  const double look = kRadius + wanted_;
+  for (double at = 0; at < look; at += task.window.voxel()) {
+    const Vector3d place = task.from.position + at * ahead;
+    if (task.window.at(place) == mapping::Occupancy::occupied) return;
+    if (task.window.is_free(place)) continue;
+    const auto before = std::count_if(hidden_.begin(), hidden_.end(), [&](const HiddenSpace& space) {
+      return (space.centre - place).norm() < kNextTo;
+    });
+    if (hidden_.size() == kMost) hidden_.erase(hidden_.begin());
+    hidden_.push_back({place, kRadius * std::min(1 + static_cast<int>(before), kGrowths)});
+    return;
+  }
 }
 
 /// Straight back from the way on, or askew, as far as that is free: each time at one place farther, until a
@@ -409,7 +432,7 @@ const LocalPlan& LocalPlanner::plan(const MotionState& from, const Vector3d& wan
     commit(task, false);
     return plan_;
   }
-  guide_.set(window, goal, {options_.vehicle.lowest, options_.vehicle.highest}, options_.arrival);
+  guide_.set(window, goal, {options_.vehicle.lowest, options_.vehicle.highest}, options_.arrival, hidden_);
   const bool stuck = gets_nowhere(task);
   if (goes_on_hopping(task) || goes_on_retreating(task)) return plan_;
   plan_.peering = options_.peering && is_blind_ahead(task);

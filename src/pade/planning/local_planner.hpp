@@ -100,6 +100,7 @@ class LocalPlanner {
   bool try_hop(const Task& task, const MotionCommand& command, double clear, double hold);
   bool hop(const Task& task);
   bool is_stuck_here(const Task& task);
+  void give_up_what_is_ahead(const Task& task);
   bool back_off(const Task& task);
   bool step_aside(const Task& task);
   bool goes_on_retreating(const Task& task);
@@ -126,6 +127,7 @@ class LocalPlanner {
   Retreat retreat_ = Retreat::none;
   Eigen::Vector3d stuck_at_ = Eigen::Vector3d::Zero();  // where it last began to hop
   int hops_here_ = 0;
+  std::vector<HiddenSpace> hidden_;  // that it has given up to see
 };
 
 }  // namespace pade::planning

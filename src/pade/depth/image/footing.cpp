@@ -14,8 +14,8 @@ namespace pade::depth {
 namespace {
 
 constexpr std::size_t kFirst = 12;  // pixels with texture that are asked
-constexpr std::size_t kFewest = 3;  // of them that have to answer, and half of them
-constexpr std::size_t kSparse = 3;  // one of so many on the way down has texture, or it is specks of noise
+constexpr std::size_t kFewest = 6;  // that have to be there, and half of them to answer
+constexpr std::size_t kSparse = 2;  // one of so many on the way down has texture, or it is specks of noise
 constexpr double kSteepest = 0.5;   // least share of up that is upward in the image: 60 degrees
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
@@ -77,7 +77,7 @@ float Columns::footing(cv::Point p) const {
     const float at = bound * ahead(ray(p.x, p.y));
     if (at > 0) bounds[answers++] = at;
   }
-  if (answers < kFewest || 2 * answers < asked || kSparse * asked < passed) return kNone;
+  if (asked < kFewest || 2 * answers < asked || kSparse * asked < passed) return kNone;
   auto* const low = bounds.data() + answers / 4;  // edges and wrong matches make single bounds small
   std::nth_element(bounds.data(), low, bounds.data() + answers);
   return *low;
