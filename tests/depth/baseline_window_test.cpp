@@ -120,6 +120,32 @@ TEST(BaselineWindow, UnevenStepsCountByTheirLength) {
   }
 }
 
+/// An outage of the satellites over a vehicle that hovers: what GPS/INS says of steps of a centimetre is off
+/// by several, more and more. The images hand the scale of the flight before on, and the variance says so.
+TEST(BaselineWindow, AHoverKeepsTheScaleOfTheFlightBeforeAndTheVarianceSaysSo) {
+  double squared = 0;
+  double stated = 0;
+  constexpr int kFlights = 200;
+  for (int k = 0; k < kFlights; ++k) {
+    Flight flight(16);
+    Random random(static_cast<std::uint64_t>(k) + 1);
+    const double common = std::exp(0.02 * random.normal());
+    for (int i = 0; i < 40; ++i)
+      flight.fly(0.2, 0.2 * common * std::exp(0.03 * random.normal()), 0.2 * std::hypot(0.02, 0.03),
+                 0.003 * random.normal(), 8);
+    const double drift = random.normal();
+    for (int i = 0; i < 60; ++i) {
+      const double sigma = 0.02 + 0.001 * i;
+      flight.fly(0.01, std::abs(0.01 + sigma * drift), sigma, 0.003 * random.normal(), 8);
+    }
+    squared += std::pow(std::log(flight.lengths.back() / 0.01), 2);
+    stated += flight.window.variance();
+  }
+  EXPECT_LT(std::sqrt(squared / kFlights), 0.05);
+  EXPECT_GT(stated / squared, 0.5);
+  EXPECT_LT(stated / squared, 3);
+}
+
 TEST(BaselineWindow, GivenAcrossTheDirectionItIsTheLengthAlongItThatCounts) {
   // 3 cm of noise make a step of 20 cm longer on the average; its part along the true direction they do not.
   Random random(4);

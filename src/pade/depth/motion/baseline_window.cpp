@@ -28,9 +28,19 @@ Given given_along(const RelativeMotion& motion, const Eigen::Vector3d& direction
   const double length = weight.dot(t) / information;
   // A direction that GPS/INS contradicts: its length says little.
   constexpr double kContradicts = 0.3;
-  if (!(length > kContradicts * norm)) return {std::log(std::max(norm, kShortest)), 1};
+  if (!(length > kContradicts * norm))
+    return {std::log(std::max(norm, kShortest)),
+            std::max(1.0, 1 / (information * std::max(norm * norm, kShortest * kShortest)))};
   return {std::log(std::max(length, kShortest)),
           std::max(kLeastVariance, 1 / (information * std::max(length * length, kShortest * kShortest)))};
+}
+
+/// What a step adds to the error that all lengths share, if its length is that of the images: each is an
+/// average of the s before it and an error of its own, so that their common level moves by 2 / (s + 1) of
+/// that.
+double handed_on(const BaselineWindow::Seen& seen, Eigen::Index before) {
+  const auto span = static_cast<double>(std::clamp<Eigen::Index>(seen.steps, 1, before));
+  return seen.variance * std::pow(2 / (span + 1), 2);
 }
 
 Eigen::VectorXd grown(const Eigen::VectorXd& v, double value) {
@@ -91,12 +101,13 @@ std::vector<double> BaselineWindow::push(const RelativeMotion& given, const Eige
   const Eigen::VectorXd best = information_.ldlt().solve(right_);
   const Eigen::VectorXd factors = (best.head(n) - x_).array().exp();
   x_ = best;
+  common_ = seen && n > 0 ? std::min(of_the_window(), common_ + handed_on(*seen, n)) : of_the_window();
   return {factors.begin(), factors.end()};
 }
 
 double BaselineWindow::length() const { return std::exp(x_[x_.size() - 1]); }
 
-double BaselineWindow::variance() const {
+double BaselineWindow::of_the_window() const {
   const auto n = static_cast<double>(x_.size());
   const double stated = n / variances_.cwiseInverse().sum();
   const double scatter = ((given_ - x_).cwiseAbs2().array() / variances_.array()).sum() + past_scatter_;

@@ -45,11 +45,14 @@ class BaselineWindow {
   [[nodiscard]] double length() const;
   /// Variance of the logarithm of what all lengths have in common. As far as the lengths that GPS/INS gives
   /// scatter about the ratios of the images their errors are of each step, and shrink with the number of
-  /// steps; the rest is taken for common to all.
-  [[nodiscard]] double variance() const;
+  /// steps; the rest is taken for common to all. It is no more than what the images have handed on from the
+  /// steps before: a vehicle that comes to hover keeps the scale that it had in flight. @pre push() was
+  /// called
+  [[nodiscard]] double variance() const { return common_; }
 
  private:
   void drop_oldest();
+  [[nodiscard]] double of_the_window() const;
   int most_;
   Eigen::VectorXd x_;            // best log lengths, oldest first
   Eigen::MatrixXd information_;  // of x
@@ -58,6 +61,7 @@ class BaselineWindow {
   Eigen::VectorXd variances_;    // r
   double past_scatter_ = 0;      // sum of (log g - x)^2 / r of the steps that have left, fading
   double past_steps_ = 0;        // their number, fading
+  double common_ = 0;            // variance()
 };
 
 }  // namespace pade::depth
