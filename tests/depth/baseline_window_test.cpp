@@ -181,6 +181,10 @@ TEST(BaselineWindow, IsSurprisedByALengthThatNobodyElseHas) {
   // GPS/INS that knows nothing of the length contradicts nothing.
   EXPECT_LT(flight.window.surprise(step(0.05 * kForward, 0.1), kForward, {0.025, 1e-4, 4}), 1);
   EXPECT_EQ(BaselineWindow(8).surprise(given, kForward, {0.025, 1e-4, 4}), 0);
+  // Nor does one that only knows that a vehicle stands, whatever the logarithm of its residual motion.
+  RelativeMotion still = step({0.02, 0.02, 0}, 0.06);
+  still.covariance(2, 2) = 0.004 * 0.004;
+  EXPECT_LT(flight.window.surprise(still, kForward, {0.0008, 1e-4, 4}), 1);
 }
 
 }  // namespace

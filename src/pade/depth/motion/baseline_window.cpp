@@ -10,9 +10,11 @@ namespace {
 
 constexpr double kLeastVariance = 1e-10;  // of a log length: exact
 
-/// Length along a direction that fits a translation best, and the variance of its logarithm.
+/// Length along a direction that fits a translation best, and the variance of its logarithm; and as they are,
+/// before a length that GPS/INS contradicts is replaced.
 struct Given {
   double log_length, variance;
+  double length, squared_sigma;
 };
 
 Given given_along(const RelativeMotion& motion, const Eigen::Vector3d& direction) {
@@ -28,11 +30,14 @@ Given given_along(const RelativeMotion& motion, const Eigen::Vector3d& direction
   const double length = weight.dot(t) / information;
   // A direction that GPS/INS contradicts: its length says little.
   constexpr double kContradicts = 0.3;
-  if (!(length > kContradicts * norm))
-    return {std::log(std::max(norm, kShortest)),
-            std::max(1.0, 1 / (information * std::max(norm * norm, kShortest * kShortest)))};
+  if (!(length > kContradicts * norm)) {
+    const double per_length2 = 1 / std::max(norm * norm, kShortest * kShortest);
+    return {std::log(std::max(norm, kShortest)), std::max(1.0, covariance.trace() * per_length2), length,
+            1 / information};
+  }
   return {std::log(std::max(length, kShortest)),
-          std::max(kLeastVariance, 1 / (information * std::max(length * length, kShortest * kShortest)))};
+          std::max(kLeastVariance, 1 / (information * std::max(length * length, kShortest * kShortest))),
+          length, 1 / information};
 }
 
 /// What a step adds to the error that all lengths share, if its length is that of the images: each is an
@@ -72,8 +77,11 @@ double BaselineWindow::surprise(const RelativeMotion& given, const Eigen::Vector
   share.tail(span) = x_.tail(span).array().exp();
   share /= share.sum();
   const double difference = std::log(seen.length) - measured.log_length;
-  const double variance = measured.variance + seen.variance + share.dot(information_.ldlt().solve(share));
-  return difference * difference / variance;
+  const double of_images = seen.variance + share.dot(information_.ldlt().solve(share));
+  // Of a hover GPS/INS may know that it is one and yet have no idea of the logarithm.
+  const double apart = seen.length - measured.length;
+  return std::min(difference * difference / (measured.variance + of_images),
+                  apart * apart / (measured.squared_sigma + seen.length * seen.length * of_images));
 }
 
 std::vector<double> BaselineWindow::push(const RelativeMotion& given, const Eigen::Vector3d& direction,
