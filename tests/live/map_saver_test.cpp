@@ -292,7 +292,7 @@ TEST_F(MapOnDisk, LosesInFiftyKillsOnlyWhatCameAfterTheLastSave) {
       ::mmap(nullptr, sizeof(Witness), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   ASSERT_NE(shared, MAP_FAILED);
   std::mt19937 random(4);
-  std::uniform_int_distribution<int> moment(0, 25000);  // us
+  std::uniform_int_distribution<int> moment(0, 60000);  // us
   int maps = 0;
   for (int kill = 0; kill < 50 && !HasFailure(); ++kill) {
     Witness& witness = *new (shared) Witness;
