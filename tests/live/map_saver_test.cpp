@@ -3,17 +3,23 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <new>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
@@ -251,6 +257,107 @@ TEST_F(MapOnDisk, IsWholeAfterFiftyKills) {
     }
   }
   EXPECT_EQ(there, 50);
+}
+
+/// What a killed child had to say, in memory that outlives it.
+struct Witness {
+  std::atomic<int> saved{-1};  // the last map that lies there for certain
+  std::atomic<bool> begun{false};
+};
+
+/// @param each  called in the child with the number of the map that comes, until it is killed
+void kill_at(int microseconds, Witness& witness, const std::function<void(int)>& each) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    for (int i = 0;; ++i) {
+      each(i);
+      witness.begun = true;
+    }
+  }
+  EXPECT_TRUE(within_seconds(5, [&] { return witness.begun.load(); }));
+  std::this_thread::sleep_for(std::chrono::microseconds(microseconds));
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+}
+
+/// What lies there is the last map that was saved, or the one that was just being written: never an older
+/// one, and never one with the origin of another, though the poses jump at each third.
+TEST_F(MapOnDisk, LosesInFiftyKillsOnlyWhatCameAfterTheLastSave) {
+  const std::array views{walls(1), walls(2), walls(3), walls(4), walls(5), walls(6)};
+  const int count = static_cast<int>(views.size());
+  std::vector<std::string> bytes;
+  for (const auto& view : views) bytes.push_back(bytes_of_view(*view));
+  void* const shared =
+      ::mmap(nullptr, sizeof(Witness), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(shared, MAP_FAILED);
+  std::mt19937 random(4);
+  std::uniform_int_distribution<int> moment(0, 60000);  // us
+  int maps = 0;
+  for (int kill = 0; kill < 50 && !HasFailure(); ++kill) {
+    Witness& witness = *new (shared) Witness;
+    std::optional<MapSaver> saver;  // of the child
+    kill_at(moment(random), witness, [&](int i) {
+      if (!saver) saver.emplace(file("map.bt"), 0.0001);
+      if (i % 3 == 2) saver->begin_anew();
+      LiveUpdate update = update_with(views[static_cast<std::size_t>(i % count)]);
+      update.origin.x() = (i + 1) / 3;  // NOLINT(bugprone-integer-division): jumps so far
+      const std::size_t before = saver->report().saved;
+      const std::size_t wanted = before + (i % 3 == 2 ? 2 : 1);  // the one that ended, and this one
+      saver->take(update);
+      while (saver->report().saved < wanted) std::this_thread::sleep_for(std::chrono::microseconds(50));
+      witness.saved = i;
+    });
+    const int saved = witness.saved;
+    int newest = -1;
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      const std::string name = entry.path().filename().string();
+      if (!name.starts_with("map") || entry.path().extension() != ".bt") continue;
+      ASSERT_TRUE(fs::exists(io::side_car_of(entry.path()))) << "kill " << kill << ": " << name;
+      // Of the three pictures of a map that has this origin it is one.
+      const int last = 3 * static_cast<int>(io::local_origin_of(entry.path()).x()) + 1;
+      int number = last;
+      while (number > last - 3 &&
+             (number < 0 || content(name) != bytes[static_cast<std::size_t>(number % count)]))
+        --number;
+      EXPECT_GT(number, last - 3) << "kill " << kill << ": " << name;
+      newest = std::max(newest, number);
+      ++maps;
+    }
+    EXPECT_GE(newest, saved) << "kill " << kill;
+    EXPECT_LE(newest, saved + 1) << "kill " << kill;
+    for (const auto& entry : fs::directory_iterator(folder_)) fs::remove(entry.path());
+  }
+  EXPECT_GE(maps, 50);
+  ::munmap(shared, sizeof(Witness));
+}
+
+/// The start of a session moves what an earlier one has left; whatever ends it, no map loses what lies beside
+/// it.
+TEST_F(MapOnDisk, KeepsWhatLiesBesideAnEarlierOneInFiftyKills) {
+  const auto view = walls(1);
+  void* const shared =
+      ::mmap(nullptr, sizeof(Witness), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(shared, MAP_FAILED);
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> moment(0, 5000);  // us
+  for (int kill = 0; kill < 50; ++kill) {
+    kill_at(moment(random), *new (shared) Witness, [&](int) {
+      MapSaver saver(file("map.bt"), 0.0001);
+      saver.take(update_with(view));
+      while (saver.report().saved == 0) std::this_thread::sleep_for(std::chrono::microseconds(50));
+    });
+  }
+  int maps = 0;
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("map") || entry.path().extension() != ".bt") continue;
+    EXPECT_TRUE(fs::exists(io::side_car_of(entry.path()))) << name;
+    EXPECT_EQ(content(name), bytes_of_view(*view)) << name;
+    ++maps;
+  }
+  EXPECT_GE(maps, 50);
+  ::munmap(shared, sizeof(Witness));
 }
 
 /// Pulling the battery takes what the system had not written yet: of a file the bytes, so that it is there

@@ -345,6 +345,22 @@ TEST(MapOptions, ThatMakeNoSenseAreRefusedByName) {
   }
 }
 
+TEST(MapOptions, EachThatIsNoNumberIsRefusedByName) {
+  std::vector<std::string> names;
+  MapOptions options;
+  MapOptions::visit(options, [&](const char* name, double&, const char*) { names.emplace_back(name); });
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    MapOptions spoilt;
+    std::size_t field = 0;
+    MapOptions::visit(spoilt, [&](const char*, double& value, const char*) {
+      if (field++ == i) value = std::nan("");
+    });
+    const auto map = OccupancyMap::create(spoilt);
+    ASSERT_FALSE(map.ok()) << names[i];
+    EXPECT_NE(map.error().message.find(names[i]), std::string::npos) << map.error().message;
+  }
+}
+
 TEST(BackProjection, InvertsProjection) {
   const AnalyticFlight flight = tilted("forward");
   for (const int window : {1, 4}) {

@@ -165,6 +165,32 @@ TEST(PackedMap, IsTheMapAndMuchSmaller) {
   RecordProperty("plain_MB", std::to_string(1e-6 * static_cast<double>(plain.memory())));
   RecordProperty("packing_MB", std::to_string(1e-6 * static_cast<double>(packing.memory())));
   EXPECT_LT(static_cast<double>(packing.memory()), 0.6 * static_cast<double>(plain.memory()));
+
+  // For a view of a small place no more is unpacked than lies there.
+  const std::size_t before = packing.voxels().packed_memory();
+  const Eigen::Vector3d there =
+      flight.T_world_camera[0].translation + Eigen::Vector3d(0, 64 * (kPlaces - 1), 0);
+  MapView::of(packing, {there.array() - 0.01, there.array() + 0.01});
+  EXPECT_GT(static_cast<double>(packing.voxels().packed_memory()), 0.9 * static_cast<double>(before));
+
+  // A view whose window slides away and back: what it says of each place is the same each time.
+  const auto leaves_of_view = [](const MapView& view) {
+    std::vector<KeptLeaf> all;
+    view.for_each_leaf([&](const MapLeaf& leaf) { all.push_back({leaf.code, leaf.depth, leaf.log_odds}); });
+    return all;
+  };
+  std::vector<std::vector<KeptLeaf>> seen;
+  for (int leg = 0; leg < 2 * kPlaces - 1; ++leg) {
+    const int place = leg < kPlaces ? leg : 2 * kPlaces - 2 - leg;
+    const Eigen::Vector3d middle = flight.T_world_camera[0].translation + Eigen::Vector3d(0, 64 * place, 0);
+    const Eigen::AlignedBox3d window(middle.array() - 15, middle.array() + 15);
+    seen.push_back(leaves_of_view(*MapView::of(packing, window)));
+    EXPECT_EQ(seen.back(), leaves_of_view(*MapView::of(plain, window)));
+    if (leg >= kPlaces) {
+      EXPECT_EQ(seen.back(), seen[static_cast<std::size_t>(place)]);
+    }
+    EXPECT_GT(seen.back().size(), 1000U);
+  }
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ io::MapFormat format_of(const fs::path& file) {
 }
 
 /// What may lie beside a map and belong to it.
-constexpr std::array<std::string_view, 3> kOfAMap = {".bt", ".ot", ".json"};
+constexpr std::array<std::string_view, 3> kOfAMap = {".json", ".bt", ".ot"};
 
 }  // namespace
 
@@ -127,24 +127,42 @@ fs::path MapSaver::free_name() const {
   }
 }
 
-/// Before the first map of this session takes its name.
+/// Before the first map of this session takes its name. Whatever ends the program meanwhile, what belongs to
+/// a map lies beside it: under both names until the map has moved.
 Status MapSaver::keep_earlier() {
   std::error_code failed;
   if (kept_earlier_) return {};
   const fs::path numbered = free_name();
+  const fs::path beside = io::side_car_of(file_);
   for (const std::string_view extension : kOfAMap) {
     const fs::path old = fs::path(file_).replace_extension(extension);
     const fs::path now = fs::path(numbered).replace_extension(extension);
     if (!fs::is_regular_file(old, failed)) continue;
-    fs::rename(old, now, failed);
+    if (old == beside) {
+      fs::create_hard_link(old, now, failed);
+      if (failed) fs::copy_file(old, now, failed);  // a disk without links
+    } else {
+      fs::rename(old, now, failed);
+    }
     if (failed)
       return Error{fmt::format("{}: the map of an earlier session cannot be moved to {}: {}", old.string(),
                                now.filename().string(), failed.message())};
     const std::lock_guard lock(mutex_);
-    if (old == file_ || report_.earlier.empty()) report_.earlier = now.string();
+    if (old == file_ || report_.earlier.empty() || report_.earlier == io::side_car_of(now))
+      report_.earlier = now.string();
   }
+  fs::remove(beside, failed);
   kept_earlier_ = true;
   return {};
+}
+
+/// A map that has ended lies under its number: the same under the name of the next, beside which soon the
+/// next one's origin lies, would be a map of another place.
+void MapSaver::remove_own() const {
+  std::error_code ignored;
+  if (!kept_earlier_) return;
+  fs::remove(file_, ignored);
+  fs::remove(io::side_car_of(file_), ignored);
 }
 
 /// What lies beside it first: a map without it would be read by other options.
@@ -161,6 +179,7 @@ void MapSaver::save(const Picture& picture, bool is_finished) {
   const fs::path file = is_finished ? free_name() : file_;
   Status status = is_finished ? Status() : keep_earlier();
   if (status) status = write(file, io::encode_map(*picture.view, format_of(file)), picture.origin);
+  if (status && is_finished) remove_own();
   const std::lock_guard lock(mutex_);
   if (!status) {
     ++report_.failed;

@@ -72,6 +72,7 @@ class MapSaver : public Sink {
   Status write(const std::filesystem::path& file, const io::ByteSource& map, const Eigen::Vector3d& origin);
   [[nodiscard]] std::filesystem::path free_name() const;
   Status keep_earlier();
+  void remove_own() const;
 
   std::filesystem::path file_;
   double every_;

@@ -64,6 +64,19 @@ bool is_placed(const PendingHits::Evidence& evidence) {
   return 4 * std::numbers::pi * sum * sum / looks >= 1 / (kPlacedTo * kPlacedTo);
 }
 
+/// Whether it has pixels that look somewhere.
+bool is_usable(const Camera& camera) {
+  return camera.width > 0 && camera.height > 0 && camera.fx > 0 && camera.fy > 0 &&
+         std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy);
+}
+
+/// Whether it is a rotation, to the rounding of files, and a place whose square is a number.
+bool is_usable(const Pose& pose) {
+  constexpr double kFarthest = 1e100;  // m
+  return pose.is_finite() && std::abs(pose.rotation.squaredNorm() - 1) < 0.1 &&
+         pose.translation.cwiseAbs().maxCoeff() < kFarthest;
+}
+
 /// By position, each place once: a cube holds what lies in it.
 void put_in_order(std::vector<MapCell>& cells) {
   std::sort(cells.begin(), cells.end(), [](const MapCell& a, const MapCell& b) {
@@ -243,7 +256,7 @@ void OccupancyMap::remember_view() {
 
 MapChange OccupancyMap::integrate(const DepthImage& image, const Camera& camera, const Pose& T_world_camera) {
   MapChange change;
-  if (image.empty() || !T_world_camera.is_finite()) return change;
+  if (image.empty() || !is_usable(camera) || !is_usable(T_world_camera)) return change;
   const Camera cells = camera_of_cells(camera, image.window);
   arrive_at(T_world_camera.translation);
   scratch_->now.set(image, camera, T_world_camera,

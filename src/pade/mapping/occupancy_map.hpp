@@ -163,7 +163,9 @@ class OccupancyMap {
   /// @param image           variance empty = depth is exact; own_variance empty = variance; state empty =
   /// measured wherever there is depth; bound empty = Z - k sigma of measured pixels
   /// @param camera          pinhole of the image at full size (its distortion is ignored)
-  /// @param T_world_camera  metres; must be finite
+  /// @param T_world_camera  metres
+  ///
+  /// Where the pose or the camera is none (NaN, no rotation, no focal length) nothing changes.
   MapChange integrate(const DepthImage& image, const Camera& camera, const Pose& T_world_camera);
 
   /// Time goes on without a depth image: with MapOptions::forget_after free voxels become unknown that were

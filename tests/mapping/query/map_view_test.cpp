@@ -1,6 +1,7 @@
 #include "pade/mapping/query/map_view.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -8,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <random>
+#include <set>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -187,6 +189,22 @@ TEST(MapView, KnowsNothingOutsideItsWindow) {
     }
   }
   EXPECT_GT(inside, 100U);
+}
+
+TEST(MapView, TakesTheMemoryOfWhatIsKnownInItsWindow) {
+  const OccupancyMap map = random_map(5);
+  const auto nothing = MapView::of(std::move(OccupancyMap::create()).value());
+  const auto part = MapView::of(map, {Vector3d::Constant(-1), Vector3d::Constant(1)});
+  const auto all = MapView::of(map);
+  EXPECT_LT(nothing->memory(), 200'000U);
+  EXPECT_GT(part->memory(), nothing->memory());
+  EXPECT_GT(all->memory(), part->memory());
+  // What differs has at least the words of a tile, and no more than those and a byte for each voxel.
+  std::set<std::array<long, 3>> tiles;
+  map.for_each([&](const MapCell& cell, Occupancy) {
+    tiles.insert({cell.key[0] / 8, cell.key[1] / 8, cell.key[2] / 8});
+  });
+  EXPECT_LT(all->memory(), nothing->memory() + 1000 * tiles.size() + 300'000);
 }
 
 TEST(MapView, CountsTheVoxelsOfABoxAndOfABall) {

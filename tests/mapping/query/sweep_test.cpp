@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -187,6 +188,61 @@ TEST(Ray, ThroughTheCornersOfVoxelsEnds) {
         ASSERT_TRUE(hit);
         EXPECT_LT(hit->length, 30);
       }
+}
+
+/// From corners, edges and centres of voxels towards others: the voxels whose inside the ray crosses are
+/// known by integers alone. Voxels of 1/8 m, so that all places are exact.
+TEST(Ray, ThroughCornersAndEdgesMissesNoVoxelThatItCrosses) {
+  constexpr double kVoxel = 0.125;
+  constexpr double kReach = 12;
+  const OccupancyMap map = random_map(9, kVoxel);
+  const auto view = MapView::of(map);
+  std::mt19937_64 random(9);
+  const auto drawn = [&](int least, int most) {
+    return std::uniform_int_distribution<int>(least, most)(random);
+  };
+  std::size_t hits = 0;
+  for (int i = 0; i < 4000; ++i) {
+    std::array<int, 3> a{}, d{};  // start and direction in half voxels
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      a[axis] = drawn(-40, 40);
+      d[axis] = drawn(-3, 3);
+      if (d[axis] == 0) a[axis] = 2 * (a[axis] / 2) + 1;  // within voxels, and not between two all the way
+    }
+    const Vector3d start = kVoxel / 2 * Vector3d(a[0], a[1], a[2]);
+    const Vector3d direction(d[0], d[1], d[2]);
+    if (direction.isZero(0)) continue;
+    // Where it passes planes, in sixths of the direction: 6 is a multiple of 1, 2 and 3.
+    std::vector<int> planes{0};
+    const double per_sixth = kVoxel / 2 * direction.norm() / 6;
+    const int end = static_cast<int>(kReach / per_sixth);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (int t = 0; d[axis] != 0 && t <= end; ++t)
+        if ((6 * a[axis] + t * d[axis]) % 12 == 0) planes.push_back(t);
+    std::sort(planes.begin(), planes.end());
+    planes.erase(std::unique(planes.begin(), planes.end()), planes.end());
+    for (const UnknownSpace unknown : {UnknownSpace::blocked, UnknownSpace::free}) {
+      double first = std::numeric_limits<double>::infinity();  // at which a voxel is entered that blocks
+      for (std::size_t k = 0; k + 1 < planes.size() && !std::isfinite(first); ++k) {
+        Vector3d centre;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const int middle = 12 * a[axis] + (planes[k] + planes[k + 1]) * d[axis];  // in 24ths of a voxel
+          centre[static_cast<int>(axis)] = kVoxel * (std::floor(middle / 24.0) + 0.5);
+        }
+        if (blocks(map.at(centre), unknown)) first = planes[k] * per_sixth;
+      }
+      const auto hit = view->ray(start, direction, kReach, unknown);
+      ASSERT_TRUE(hit || !std::isfinite(first)) << start.transpose() << " to " << direction.transpose();
+      if (!hit) continue;
+      ++hits;
+      ASSERT_LE(hit->length, first + 1e-9) << start.transpose() << " to " << direction.transpose();
+      // Sooner only where it touches a voxel at a corner or an edge.
+      EXPECT_TRUE(blocks(map.at(hit->voxel), unknown));
+      EXPECT_LE((hit->voxel - hit->place).cwiseAbs().maxCoeff(), kVoxel / 2 + 1e-9);
+      EXPECT_NEAR((hit->place - start - hit->length * direction.normalized()).norm(), 0, 1e-9);
+    }
+  }
+  EXPECT_GT(hits, 2000U);
 }
 
 // The paper: "the map's volumetric representation enables the trajectory planner to avoid collisions and

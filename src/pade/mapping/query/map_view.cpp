@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -17,10 +18,9 @@ namespace {
 using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
-const TileBounds kEverywhere{{0, 0, 0}, {kTilesPerAxis - 1, kTilesPerAxis - 1, kTilesPerAxis - 1}};
-
-TileBounds window_in_tiles(const AlignedBox3d& window, double voxel) {
-  return window.isEmpty() ? kEverywhere : tiles_of(window, voxel);
+AlignedBox3d everywhere() {
+  const Vector3d far = Vector3d::Constant(std::numeric_limits<double>::infinity());
+  return {-far, far};
 }
 
 double probability_of(const Tile& tile, std::size_t in_tile, double step) {
@@ -140,6 +140,29 @@ class Leaves {
   std::array<std::int8_t, kVoxels> values_{};
 };
 
+/// Bytes of a tree, what its nodes share counted once.
+class Footprint {
+ public:
+  template <class Part>
+  void add(const Part& part) {
+    constexpr std::size_t kCounters = 16;  // of a shared pointer
+    if (!counted_.insert(&part).second) return;
+    bytes_ += sizeof part + kCounters;
+    if constexpr (std::is_same_v<Part, Tile>) {
+      bytes_ += part.log_odds.memory();
+    } else {
+      const typename Part::Child* before = nullptr;  // most are unknown, and the same
+      for (const auto& child : part.children)
+        if (child.get() != std::exchange(before, child.get())) add(*child);
+    }
+  }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+ private:
+  std::unordered_set<const void*> counted_;
+  std::size_t bytes_ = 0;
+};
+
 constexpr int kNothingKnown = -1000;
 
 void set_probability(Contents& contents, int highest, double step) {
@@ -159,12 +182,12 @@ MapView::MapView(TileTree tiles, const AlignedBox3d& window)
 
 MapView::~MapView() = default;
 
-std::shared_ptr<const MapView> MapView::of(const OccupancyMap& map) { return of(map, AlignedBox3d()); }
+std::shared_ptr<const MapView> MapView::of(const OccupancyMap& map) { return of(map, everywhere()); }
 
 std::shared_ptr<const MapView> MapView::of(const OccupancyMap& map, const AlignedBox3d& window) {
   const std::array<TouchedCube, 1> all{};
   TileTree tiles = rebuilt(empty_tiles(map.voxels(), map.options().voxel), map.voxels(), all,
-                           window_in_tiles(window, map.options().voxel));
+                           tiles_of(window, map.options().voxel));
   return std::shared_ptr<const MapView>(new MapView(std::move(tiles), window));
 }
 
@@ -174,7 +197,7 @@ std::shared_ptr<const MapView> MapView::after(const OccupancyMap& map, const Map
   for (const MapCell& cell : change.touched) {
     touched.push_back({morton_code(cell.key), cell.depth});
   }
-  TileTree tiles = rebuilt(*tiles_, map.voxels(), touched, window_in_tiles(window_, tiles_->voxel));
+  TileTree tiles = rebuilt(*tiles_, map.voxels(), touched, tiles_of(window_, tiles_->voxel));
   return std::shared_ptr<const MapView>(new MapView(std::move(tiles), window_));
 }
 
@@ -189,6 +212,13 @@ std::shared_ptr<const MapView> MapView::flown(std::span<const Vector3d> path, do
 }
 
 double MapView::voxel() const { return tiles_->voxel; }
+
+std::size_t MapView::memory() const {
+  Footprint footprint;
+  footprint.add(*tiles_->world);
+  return footprint.bytes() + sizeof(TileTree) + tiles_->groups.capacity() * sizeof(const TileGroup*) +
+         tiles_->near_tiles.capacity() * sizeof(const Tile*);
+}
 
 AlignedBox3d MapView::bounds() const {
   AlignedBox3d box;
@@ -219,13 +249,20 @@ double MapView::probability(const Vector3d& point) const {
 Contents MapView::in_box(const AlignedBox3d& box) const {
   Contents contents;
   int highest = kNothingKnown;
-  if (!box.isEmpty()) {
-    const VoxelIndex first = voxel_beside(box.min(), tiles_->voxel);
-    const VoxelIndex last = voxel_beside(box.max(), tiles_->voxel);
+  if (is_box(box)) {
+    VoxelIndex first = voxel_beside(box.min(), tiles_->voxel);
+    VoxelIndex last = voxel_beside(box.max(), tiles_->voxel);
+    std::size_t all = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      all *= static_cast<std::size_t>(last[axis] - first[axis] + 1);
+      first[axis] = std::max(first[axis], kTileSide * tiles_->bounds.first[axis]);
+      last[axis] = std::min(last[axis], kTileSide * tiles_->bounds.last[axis] + kTileSide - 1);
+    }
     VoxelIndex v{};
     for (v[2] = first[2]; v[2] <= last[2]; ++v[2])
       for (v[1] = first[1]; v[1] <= last[1]; ++v[1])
         for (v[0] = first[0]; v[0] <= last[0]; ++v[0]) count(*tiles_, v, contents, highest);
+    contents.unknown = all - contents.occupied - contents.free;
   }
   set_probability(contents, highest, tiles_->step);
   return contents;
@@ -234,7 +271,7 @@ Contents MapView::in_box(const AlignedBox3d& box) const {
 Contents MapView::in_ball(const Vector3d& centre, double radius) const {
   Contents contents;
   int highest = kNothingKnown;
-  if (centre.allFinite() && radius > 0) {
+  if (centre.allFinite() && is_radius(radius)) {
     const VoxelIndex first = voxel_beside(centre.array() - radius, tiles_->voxel);
     const VoxelIndex last = voxel_beside(centre.array() + radius, tiles_->voxel);
     VoxelIndex v{};

@@ -61,13 +61,14 @@ class MapView {
  public:
   /// All of a map: time proportional to its size.
   static std::shared_ptr<const MapView> of(const OccupancyMap& map);
-  /// What of it lies in a box (world, m), rounded outwards to cubes of 8 voxels to a side.
+  /// What of it lies in a box (world, m), rounded outwards to cubes of 8 voxels to a side: time and memory
+  /// proportional to what is known there, however large the map is. Nothing where the box is empty or NaN.
   static std::shared_ptr<const MapView> of(const OccupancyMap& map, const Eigen::AlignedBox3d& window);
   /// The same view, window included, after an update of its map: time proportional to what it touched.
   [[nodiscard]] std::shared_ptr<const MapView> after(const OccupancyMap& map, const MapChange& change) const;
   /// As if the unknown voxels within `radius` of a path were free, for example where the vehicle itself is or
-  /// has been: no camera sees that. Occupied ones stay. Lasts until after() takes over a cube that holds
-  /// them.
+  /// has been: no camera sees that. Occupied ones stay. What is not finite frees nothing. Lasts until after()
+  /// takes over a cube that holds them.
   [[nodiscard]] std::shared_ptr<const MapView> flown(std::span<const Eigen::Vector3d> path,
                                                      double radius) const;
 
@@ -80,6 +81,9 @@ class MapView {
 
   /// Side of a voxel, m.
   [[nodiscard]] double voxel() const;
+  /// Bytes of memory that it takes, with what it shares with the views before and after it: time proportional
+  /// to its size.
+  [[nodiscard]] std::size_t memory() const;
   /// Bounds of all that is known (world, m), up to 8 voxels too large on each side; empty if nothing is.
   [[nodiscard]] Eigen::AlignedBox3d bounds() const;
 
@@ -87,14 +91,16 @@ class MapView {
   [[nodiscard]] Occupancy at(const Eigen::Vector3d& point) const;
   /// Probability that it is occupied, to 0.5 %; NaN if unknown.
   [[nodiscard]] double probability(const Eigen::Vector3d& point) const;
-  /// The voxels that a box (world, m) touches.
+  /// The voxels that a box (world, m) touches; none where it is empty or NaN.
   [[nodiscard]] Contents in_box(const Eigen::AlignedBox3d& box) const;
-  /// The voxels that come nearer than `radius` (m) to a point (world, m).
+  /// The voxels that come nearer than `radius` (m) to a point (world, m); none where one of them is not
+  /// finite. Time proportional to the ball.
   [[nodiscard]] Contents in_ball(const Eigen::Vector3d& centre, double radius) const;
 
   /// The first voxel that blocks a ray; empty if none does up to `reach`.
   /// @param origin     world, m
-  /// @param direction  of any length but zero
+  /// @param direction  of any length but zero. Where it, or the origin, is not finite, or the reach is NaN,
+  ///                   the ray is blocked where it begins, as by unknown space
   /// @param reach      m
   /// @param unknown    whether space that nobody has seen blocks
   [[nodiscard]] std::optional<Hit> ray(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
@@ -105,7 +111,7 @@ class MapView {
   /// that are met at the same place an occupied one is named before an unknown one.
   /// @param path    world, m; one point is a ball at rest, no point is never blocked. A point that is not
   ///                finite blocks the path where its segment begins, as unknown space
-  /// @param radius  m, above 0
+  /// @param radius  m, above 0 and finite; any other blocks the path where it begins, as unknown space
   /// @param unknown  whether space that nobody has seen blocks
   [[nodiscard]] std::optional<Hit> sweep(std::span<const Eigen::Vector3d> path, double radius,
                                          UnknownSpace unknown) const;

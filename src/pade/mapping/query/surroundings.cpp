@@ -94,7 +94,11 @@ std::array<double, kSectors> sectors(const MapView& view, const Vector3d& place,
   const TileTree& tiles = view.tiles();
   const bool blocks = unknown == UnknownSpace::blocked;
   Nearest nearest(place, reach, tiles.voxel);
-  if (!place.allFinite() || !(reach > 0)) return nearest.distances();
+  const bool is_question =
+      place.allFinite() && std::isfinite(reach) && !std::isnan(below) && !std::isnan(above);
+  VoxelIndex here;
+  if (!is_question || (blocks && !voxel_at(place, tiles.per_voxel, here))) return {};
+  if (!(reach > 0)) return nearest.distances();
   const VoxelIndex low = voxel_beside(place - Vector3d(reach, reach, below), tiles.voxel);
   const VoxelIndex high = voxel_beside(place + Vector3d(reach, reach, above), tiles.voxel);
   static const Tile kBeyond;
@@ -130,8 +134,9 @@ std::array<double, kSectors> sectors(const MapView& view, const Vector3d& place,
 std::vector<Vector3d> frontiers(const MapView& view, const Eigen::AlignedBox3d& box) {
   std::vector<Vector3d> found;
   const TileTree& tiles = view.tiles();
+  if (!is_box(box)) return found;
   const Eigen::AlignedBox3d within = box.intersection(view.bounds());
-  if (box.isEmpty() || within.isEmpty()) return found;
+  if (within.isEmpty()) return found;
   const VoxelIndex first = voxel_beside(within.min(), tiles.voxel);
   const VoxelIndex last = voxel_beside(within.max(), tiles.voxel);
   const auto is_unknown = [&](int x, int y, int z) { return tiles.at({x, y, z}) == Occupancy::unknown; };

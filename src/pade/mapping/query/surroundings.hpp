@@ -15,7 +15,9 @@ namespace pade::mapping {
 inline constexpr std::size_t kSectors = 72;  ///< of 5 degrees, as in MAVLink's OBSTACLE_DISTANCE
 
 /// Horizontal distance to the nearest voxel that blocks in each sector, in metres; infinity where there is
-/// none. Sector 0 is centred on the world's x axis, the others follow counter-clockwise (towards y).
+/// none. Sector 0 is centred on the world's x axis, the others follow counter-clockwise (towards y). What is
+/// not finite (`below` and `above` may be infinite) has something at 0 m all around, and so has, where
+/// unknown space blocks, a place that no map can hold.
 /// @param place  world, m
 /// @param reach  m
 /// @param below  of the voxels that count, and
@@ -23,7 +25,8 @@ inline constexpr std::size_t kSectors = 72;  ///< of 5 degrees, as in MAVLink's 
 std::array<double, kSectors> sectors(const MapView& view, const Eigen::Vector3d& place, double reach,
                                      double below, double above, UnknownSpace unknown);
 
-/// Centres of the free voxels in a box (world, m) that share a face with an unknown one, z slowest.
+/// Centres of the free voxels in a box (world, m; none where it is NaN) that share a face with an unknown
+/// one, z slowest.
 std::vector<Eigen::Vector3d> frontiers(const MapView& view, const Eigen::AlignedBox3d& box);
 
 }  // namespace pade::mapping

@@ -191,6 +191,12 @@ BallPath segment_path(const Vector3d& from, const Vector3d& to, double radius) {
   return path;
 }
 
+/// Of length 1. Squares of very long and very short vectors are none.
+Vector3d unit(const Vector3d& direction) {
+  if (std::isnormal(direction.squaredNorm())) return direction.normalized();
+  return (direction / direction.cwiseAbs().maxCoeff()).normalized();
+}
+
 Hit blind(const Vector3d& place, double length, std::size_t segment) {
   Hit hit;
   hit.length = length;
@@ -206,6 +212,10 @@ Hit blind(const Vector3d& place, double length, std::size_t segment) {
 std::map<VoxelIndex, std::array<std::uint64_t, 8>> voxels_along(std::span<const Vector3d> path, double radius,
                                                                 double voxel) {
   std::map<VoxelIndex, std::array<std::uint64_t, 8>> found;
+  if (!is_radius(radius)) return found;
+  const double step = kPiece * voxel;
+  const double end = kTreeCentre * voxel + radius;
+  const AlignedBox3d near(Vector3d::Constant(-end), Vector3d::Constant(end));  // what can be addressed
   const auto add = [&](const BallPath& piece) {
     for_each_tile(voxel, piece, [&](const PartOfTile& part) {
       const VoxelIndex& corner = part.corner;
@@ -223,8 +233,10 @@ std::map<VoxelIndex, std::array<std::uint64_t, 8>> voxels_along(std::span<const 
     const Vector3d& to = path[std::min(i + 1, path.size() - 1)];
     if (!path[i].allFinite() || !to.allFinite()) continue;
     const BallPath whole = segment_path(path[i], to, radius);
-    for (double s = 0; s <= whole.length; s += kPiece * voxel)
-      add({whole.at(s), whole.direction, std::min(kPiece * voxel, whole.length - s), radius});
+    if (!std::isfinite(whole.length)) continue;
+    const Range range = clipped(whole, near).value_or(Range{0, -1});
+    for (double s = std::floor(range.from / step) * step; s <= range.to; s += step)
+      add({whole.at(s), whole.direction, std::min(step, whole.length - s), radius});
   }
   return found;
 }
@@ -247,7 +259,7 @@ AlignedBox3d addressed(double voxel, double radius) {
 
 std::optional<Hit> MapView::sweep(std::span<const Vector3d> path, double radius, UnknownSpace unknown) const {
   if (path.empty()) return std::nullopt;
-  if (!path[0].allFinite()) return blind(path[0], 0, 0);
+  if (!path[0].allFinite() || !is_radius(radius)) return blind(path[0], 0, 0);
   Sweep search(*tiles_, unknown);
   const bool blocks = unknown == UnknownSpace::blocked;
   const double step = kPiece * tiles_->voxel;
@@ -260,6 +272,7 @@ std::optional<Hit> MapView::sweep(std::span<const Vector3d> path, double radius,
     const Vector3d& to = path[std::min(i + 1, path.size() - 1)];
     if (!to.allFinite()) return blind(path[i], before, i);
     const BallPath whole = segment_path(path[i], to, radius);
+    if (!std::isfinite(whole.length)) return blind(path[i], before, i);
     const Range range = to_search(whole, box);
     if (blocks && range.from != 0) return blind(path[i], before, i);
     // Pieces begin at the same places whatever has been clipped.
@@ -283,9 +296,9 @@ std::optional<Hit> MapView::sweep(std::span<const Vector3d> path, double radius,
 
 std::optional<Hit> MapView::ray(const Vector3d& origin, const Vector3d& direction, double reach,
                                 UnknownSpace unknown) const {
-  if (!origin.allFinite() || !direction.allFinite() || direction.squaredNorm() == 0)
+  if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0) || std::isnan(reach))
     return blind(origin, 0, 0);
-  const BallPath path{origin, direction.normalized(), reach, 0};
+  const BallPath path{origin, unit(direction), reach, 0};
   Range range{0, reach};
   if (unknown == UnknownSpace::free) {
     const AlignedBox3d known = bounds();

@@ -8,6 +8,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "pade/mapping/query/voxel_grid.hpp"
 #include "pade/mapping/tiles/voxel_store.hpp"
 
 namespace pade::mapping {
@@ -47,6 +48,7 @@ void TileTree::index() {
     tile_count *= near_counts[axis];
   }
   if (group_count > kMostGroups) return;
+  groups.reserve(static_cast<std::size_t>(group_count));
   for (int z = 0; z < group_counts[2]; ++z)
     for (int y = 0; y < group_counts[1]; ++y)
       for (int x = 0; x < group_counts[0]; ++x)
@@ -191,9 +193,10 @@ class Builder {
       return node_of<Part>(code, old, touched);
     } else {
       const TileBounds place = place_of(code, depth_of<Part>());
+      const auto unknown = [&] { return uniform_part<Part>(*tiles_.uniform, UniformTiles::kUnknown); };
+      if (!touches(place)) return unknown();  // before it is asked for, which would unpack it
       const VoxelStore::Entry& entry = voxels_.find(code, depth_of<Part>());
-      if (!touches(place) || entry.part == VoxelStore::Entry::kUnknown)
-        return uniform_part<Part>(*tiles_.uniform, UniformTiles::kUnknown);
+      if (entry.part == VoxelStore::Entry::kUnknown) return unknown();
       if (!entry.has_parts() && is_inside(place)) {
         extend(place);
         return uniform_part<Part>(*tiles_.uniform, value_of(entry.value));
@@ -383,7 +386,7 @@ TileTree with_tiles(TileTree tiles, std::vector<Changed> changed) {
 
 TileBounds tiles_of(const Eigen::AlignedBox3d& box, double voxel) {
   TileBounds bounds;
-  if (box.isEmpty()) return bounds;
+  if (!is_box(box)) return bounds;
   const auto index = [&](double metres) {
     const double tile = std::floor((metres / voxel + kTreeCentre) / kTileSide);
     return static_cast<int>(std::clamp(tile, -1.0, static_cast<double>(kTilesPerAxis)));

@@ -49,6 +49,8 @@ class TileLogOdds {
     values_.clear();
     mixed_ = 0;
   }
+  /// Bytes of memory beside those of the tile.
+  [[nodiscard]] std::size_t memory() const { return values_.capacity(); }
   /// Of an eighth; each at most once, in rising order, on top of what fill() or nothing has left.
   void set_same(std::size_t eighth, std::int8_t value) { same_[eighth] = value; }
   void set_values(std::size_t eighth, const std::array<std::int8_t, 64>& values) {
@@ -173,7 +175,7 @@ struct TileTree {
     const std::int64_t place = ((dz * near_counts[1] + dy) * near_counts[0] + dx + 1) & is_near;
     const Tile::Word& word =
         near_tiles[static_cast<std::size_t>(place)]->words[static_cast<unsigned>(z) & 7U];
-    const auto bit = static_cast<unsigned>(8 * y + (x & 7)) & 63U;
+    const auto bit = (8 * static_cast<unsigned>(y) + (static_cast<unsigned>(x) & 7U)) & 63U;
     return static_cast<Occupancy>((word.known >> bit & 1U) + (word.occupied >> bit & 1U));
   }
   /// The same without `near_tiles`.

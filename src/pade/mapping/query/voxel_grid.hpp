@@ -32,6 +32,14 @@ inline bool voxel_at(const Eigen::Vector3d& point, double per_voxel, VoxelIndex&
   return true;
 }
 
+/// Whether a box holds anything, and no NaN.
+inline bool is_box(const Eigen::AlignedBox3d& box) {
+  return !box.isEmpty() && !box.min().hasNaN() && !box.max().hasNaN();
+}
+
+/// Whether a radius is one.
+inline bool is_radius(double radius) { return radius > 0 && std::isfinite(radius); }
+
 /// The same, with the nearest place beyond the border where it cannot be addressed; the point is not NaN.
 inline VoxelIndex voxel_beside(const Eigen::Vector3d& point, double voxel) {
   VoxelIndex v{};
@@ -54,6 +62,7 @@ inline Eigen::AlignedBox3d box_of(const VoxelIndex& v, double voxel) {
 }
 
 /// For each tile, which voxels come nearer than `radius` to a path: by tile coordinates, bits as in a Tile.
+/// None where the radius is none; segments that lead from or to a point that is not finite are left out.
 std::map<VoxelIndex, std::array<std::uint64_t, 8>> voxels_along(std::span<const Eigen::Vector3d> path,
                                                                 double radius, double voxel);
 
