@@ -9,10 +9,9 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <octomap/OcTree.h>
 
 #include "pade/checks/scene_hardness.hpp"
 #include "pade/checks/sequence_check.hpp"
@@ -30,11 +29,12 @@
 #include "commands.hpp"
 #include "info/calibration_info.hpp"
 #include "info/info_lines.hpp"
+#include "info/map_info.hpp"
+#include "info/map_questions.hpp"
 #include "info/recording_info.hpp"
 #include "info/sequence_set.hpp"
 #include "options/json_text.hpp"
 #include "options/unused_options.hpp"
-#include "plan/place_info.hpp"
 
 namespace pade::cli {
 namespace {
@@ -55,7 +55,7 @@ struct InfoArguments {
   std::string world_up;
   std::string calibration;
   std::string topics;
-  std::vector<double> at;
+  MapQuestions questions;
   int camera = 0;
   int step = 1;
   bool json = false;
@@ -236,47 +236,6 @@ Status inform_of_sequence(const InfoArguments& arguments) {
   return {};
 }
 
-Status inform_of_map(const InfoArguments& arguments) {
-  if (Status used = used_alone(arguments, {"--at", "--json"}, "a map"); !used) return used;
-  const auto made_with = io::options_beside(arguments.path);
-  if (!made_with) return made_with.error();
-  const Result<mapping::OccupancyMap> map = io::read_map(arguments.path, *made_with);
-  if (!map) return map.error();
-  const double voxel = map->options().voxel;
-  const mapping::OccupancyMap::Counts counts = map->counts();
-  const auto volume = [&](std::size_t voxels) { return static_cast<double>(voxels) * voxel * voxel * voxel; };
-  const Eigen::AlignedBox3d bounds = map->bounds();
-  const Eigen::Vector3d origin = io::local_origin_of(arguments.path);
-  const double* asked = arguments.at.empty() ? nullptr : arguments.at.data();
-  if (arguments.json) {
-    Json json = {{"kind", "map"},
-                 {"file", arguments.path},
-                 {"voxel_m", voxel},
-                 {"nodes", map->octree()->size()},
-                 {"occupied_voxels", counts.occupied},
-                 {"free_voxels", counts.free},
-                 {"occupied_m3", volume(counts.occupied)},
-                 {"free_m3", volume(counts.free)},
-                 {"local_origin_m", json_of(origin)},
-                 {"bounds_m", nullptr}};
-    if (!bounds.isEmpty())
-      json["bounds_m"] = {{"from", json_of(bounds.min())}, {"to", json_of(bounds.max())}};
-    if (asked != nullptr) json["place"] = place_json(*map, Eigen::Vector3d(asked));
-    fmt::print("{}\n", json_text(json));
-    return {};
-  }
-  fmt::print("{}: occupancy map with voxels of {:g} m\n", arguments.path, voxel);
-  line("nodes", "{}", map->octree()->size());
-  line("occupied", "{} voxels, {:.3f} m3", counts.occupied, volume(counts.occupied));
-  line("free", "{} voxels, {:.3f} m3", counts.free, volume(counts.free));
-  if (!bounds.isEmpty()) line("bounds", "{} to {} m", vector_text(bounds.min()), vector_text(bounds.max()));
-  if (!origin.isZero(0))
-    line("local origin", "{} {} {}: add it to get back to the coordinates of the poses", origin.x(),
-         origin.y(), origin.z());
-  if (asked != nullptr) fmt::print("{}", place_text(*map, Eigen::Vector3d(asked)));
-  return {};
-}
-
 void print_timing(const io::RunTiming& timing) {
   if (timing.stages.empty()) return;
   fmt::print("  {:<12} {:>9} {:>9} {:>9} {:>9}\n", "time, ms", "median", "99 %", "largest", "mean");
@@ -370,15 +329,13 @@ Status inform(const InfoArguments& arguments) {
     if (const std::string advice = io::advice_for(path); !advice.empty())
       return Error{fmt::format("{}: cannot be read as what its name says{}", arguments.path, advice)};
     const bool map = path.extension() == ".bt" || path.extension() == ".ot";
-    if (map) return inform_of_map(arguments);
+    if (map) return inform_of_map(path, arguments.questions, *arguments.command, arguments.json);
     const Status fits = used_alone(arguments, {"--camera", "--json"}, "a calibration");
     return fits ? inform_of_calibration(path, arguments.camera, arguments.json) : fits;
   }
   if (!fs::exists(path / "run.json", code)) return inform_of_sequence(arguments);
-  if (arguments.at.empty()) return inform_of_run(arguments);
-  InfoArguments of_map = arguments;
-  of_map.path = io::map_file_of(path).string();
-  return inform_of_map(of_map);
+  if (!asks_of_map(*arguments.command)) return inform_of_run(arguments);
+  return inform_of_map(io::map_file_of(path), arguments.questions, *arguments.command, arguments.json);
 }
 
 }  // namespace
@@ -397,6 +354,13 @@ void add_info(CLI::App& app, Context& context) {
       "  pade info flights/         a folder of sequences: how hard the scene of each is, and of all\n"
       "  pade info out/flight       how a run went\n"
       "  pade info out/flight/map.bt\n"
+      "  pade info out/flight --at 5 0 1                 of a place: free? how far from what is not?\n"
+      "  pade info out/flight --ray 0 0 1 1 0 0 --reach 10 --unknown free      what the ray meets first\n"
+      "  pade info out/flight --box 4 -1 0 6 1 2         what is in it\n"
+      "  pade info out/flight --ball 5 0 1 0.5           likewise\n"
+      "  pade info out/flight --sweep 0 0 1 4 0 1 6 2 1 --radius 0.45     what a vehicle on its way meets "
+      "first\n"
+      "  pade info out/flight --frontiers                where what is known ends\n"
       "  pade info camchain.yaml --camera 1     what is understood of a calibration\n"
       "  pade info flight.tlog      messages, and whether the sensors in them will do\n"
       "  pade info flight.bag       topics, and whether they make a flight\n");
@@ -420,7 +384,7 @@ void add_info(CLI::App& app, Context& context) {
                       "Topics of a recording that are meant where several fit, separated by blanks");
   command->add_option("--step", arguments->step, "Look at each frame and the k-th before it")
       ->capture_default_str();
-  command->add_option("--at", arguments->at, "x y z: what a map says of a place, m")->expected(3);
+  add_options(*command, arguments->questions);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments, &context] {
     const Status status = inform(*arguments);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <random>
 #include <sstream>
@@ -13,6 +14,7 @@
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 
+#include "pade/io/text.hpp"
 #include "pade/mapping/tiles/voxel_code.hpp"
 
 #include "mapping/flown_map.hpp"
@@ -147,6 +149,92 @@ TEST(MapFileNodes, AnInnerNodeWithoutChildrenIsRefused) {
   ASSERT_FALSE(map.ok());
   EXPECT_NE(map.error().message.find("map.bt: an inner node has no child"), std::string::npos)
       << map.error().message;
+}
+
+/// The root of a .bt file has no state of its own: OctoMap takes one without children for occupied.
+TEST_P(MapFile, OfASpaceThatIsTheSameAllOverReadsBackTheSame) {
+  for (const float log_odds : {-1.0F, 2.0F}) {
+    std::string content = "# Octomap OcTree file\nid OcTree\nsize 1\nres 0.1\ndata\n";
+    content.append(reinterpret_cast<const char*>(&log_odds), sizeof log_odds).push_back('\0');
+    const auto map = decode_map(content, "all.ot");
+    ASSERT_TRUE(map.ok()) << map.error().message;
+    const auto state = log_odds > 0 ? Occupancy::occupied : Occupancy::free;
+    ASSERT_EQ(map->at(Vector3d(1, 2, 3)), state);
+    for (const std::string& bytes : {bytes_of(encode_map(*map, format())),
+                                     bytes_of(encode_map(*mapping::MapView::of(*map), format()))}) {
+      const auto back = decode_map(bytes, "map");
+      ASSERT_TRUE(back.ok()) << back.error().message;
+      EXPECT_EQ(back->at(Vector3d(1, 2, 3)), state);
+      EXPECT_EQ(back->at(Vector3d(-3000, 3000, -1)), state);
+    }
+  }
+}
+
+/// Other programs do not join voxels that are the same, and some write a log-odds of 0 as -0.
+TEST_P(MapFile, IsTheSameHoweverTheSameSpaceIsDivided) {
+  const auto bytes_with = [&](float zero, bool divided) {
+    auto tree = std::make_unique<octomap::OcTree>(0.1);
+    for (int i = 0; i < 16 * 16 * 16; ++i) {
+      tree->setNodeValue(0.1 * (i % 16) + 0.05, 0.1 * (i / 16 % 16) + 0.05, 0.1 * (i / 256) + 0.05, -1.0F);
+      tree->setNodeValue(0.1 * (i % 16) + 3.25, 0.1 * (i / 16 % 16) + 0.05, 0.1 * (i / 256) + 0.05,
+                         i % 3 == 0 ? zero : 0.0F);
+    }
+    if (divided) tree->expand();
+    const auto map = OccupancyMap::create({}, std::move(tree));
+    EXPECT_TRUE(map.ok());
+    return bytes_of(encode_map(*map, format()));
+  };
+  const std::string bytes = bytes_with(0.0F, false);
+  EXPECT_EQ(bytes_with(0.0F, true), bytes);
+  EXPECT_EQ(bytes_with(-0.0F, true), bytes);
+}
+
+/// A cube of 512 voxels to a side of which only an eighth is known takes the most memory for its bytes.
+TEST(MapFileNodes, ASmallFileTakesLittleMemory) {
+  std::string data;
+  std::size_t nodes = 0;
+  const std::function<void(int)> add = [&](int depth) {
+    constexpr int kParts = 7, kAlone = 3;  // depths
+    const unsigned children = depth == kParts ? 1 : depth < kAlone ? 3 : 0xffff;
+    data += {static_cast<char>(children & 255U), static_cast<char>(children >> 8U)};
+    ++nodes;
+    if (depth == kParts) {
+      ++nodes;  // its one free child
+      return;
+    }
+    for (int i = 0; i < (depth < kAlone ? 1 : 8); ++i) add(depth + 1);
+  };
+  add(0);
+  const std::string content =
+      "# Octomap OcTree binary file\nid OcTree\nsize " + std::to_string(nodes) + "\nres 0.1\ndata\n" + data;
+  const auto map = decode_map(content, "map.bt");
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->counts().free, std::size_t{4096} * 256 * 256 * 256);
+  EXPECT_LT(map->memory(), 2000 * content.size());
+}
+
+TEST(MapFileNodes, ATreeWithoutEndIsRefused) {
+  std::string content = "# Octomap OcTree binary file\nid OcTree\nsize 1000000\nres 0.1\ndata\n";
+  for (int i = 0; i < 1000000; ++i) content += std::string("\x03\0", 2);
+  const auto map = decode_map(content, "map.bt");
+  ASSERT_FALSE(map.ok());
+  EXPECT_NE(map.error().message.find("map.bt: the tree is deeper than 16 levels"), std::string::npos)
+      << map.error().message;
+}
+
+/// They come from the writer, and so are written again as they are.
+TEST(MapFileNodes, TheSeedsOfTheFuzzTargetAreMaps) {
+  for (const char* name : {"small.bt", "small.ot"}) {
+    const fs::path file = fs::path(PADE_SOURCE_DIR) / "tests/fuzz/corpus/map" / name;
+    const auto content = read_file(file);
+    ASSERT_TRUE(content.ok()) << content.error().message;
+    const auto map = decode_map(*content, name);
+    ASSERT_TRUE(map.ok()) << map.error().message;
+    EXPECT_GT(map->counts().free, 0U);
+    EXPECT_GT(map->counts().occupied, 0U);
+    EXPECT_EQ(bytes_of(encode_map(*map, file.extension() == ".bt" ? MapFormat::bt : MapFormat::ot)),
+              *content);
+  }
 }
 
 /// What a live session saves meanwhile, from the picture that others may read.

@@ -3,6 +3,7 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -140,6 +141,49 @@ TEST(Frontiers, AreFreeVoxelsBesideUnknownOnes) {
   std::size_t inside = 0;
   for (const Vector3d& at : found) inside += box.contains(at) ? 1 : 0;
   EXPECT_EQ(inside, expected);
+}
+
+/// Two voxels are in one group if a chain of voxels that touch leads from one to the other: each takes over
+/// the least number of what it touches, until nothing changes.
+TEST(Frontiers, AreGroupedByWhatTouches) {
+  const auto view = MapView::of(random_map(15));
+  auto found = frontiers(*view, AlignedBox3d(Vector3d(-2, -2, -1), Vector3d(1, 1, 1)));
+  std::mt19937_64 random(15);
+  std::erase_if(found, [&random](const Vector3d& /*at*/) { return random() % 4 != 0; });  // many groups
+  ASSERT_GT(found.size(), 100U);
+  std::vector<std::size_t> label(found.size());
+  for (std::size_t i = 0; i < label.size(); ++i) label[i] = i;
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      for (std::size_t k = 0; k < found.size(); ++k) {
+        if (label[k] >= label[i] || (found[i] - found[k]).cwiseAbs().maxCoeff() > 0.15) continue;
+        label[i] = label[k];
+        changed = true;
+      }
+    }
+  }
+  std::vector<FrontierGroup> expected(found.size(), FrontierGroup{0, Vector3d::Zero(), {}});
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    FrontierGroup& group = expected[label[i]];
+    ++group.voxels;
+    group.centre += found[i];
+    group.bounds.extend(Vector3d(found[i].array() - 0.05));
+    group.bounds.extend(Vector3d(found[i].array() + 0.05));
+  }
+  std::erase_if(expected, [](const FrontierGroup& group) { return group.voxels == 0; });
+  std::stable_sort(expected.begin(), expected.end(),
+                   [](const FrontierGroup& a, const FrontierGroup& b) { return a.voxels > b.voxels; });
+  const auto groups = frontier_groups(found, view->voxel());
+  ASSERT_EQ(groups.size(), expected.size());
+  EXPECT_GT(groups.size(), 10U);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    EXPECT_EQ(groups[i].voxels, expected[i].voxels);
+    const Vector3d mean = expected[i].centre / static_cast<double>(expected[i].voxels);
+    EXPECT_LT((groups[i].centre - mean).norm(), 1e-9);
+    EXPECT_TRUE(groups[i].bounds.isApprox(expected[i].bounds, 1e-9));
+  }
+  EXPECT_TRUE(frontier_groups({}, 0.1).empty());
 }
 
 }  // namespace

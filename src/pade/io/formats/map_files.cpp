@@ -176,6 +176,7 @@ class NodeBytes {
 
  private:
   static constexpr unsigned kFree = 1, kOccupied = 2, kInner = 3;
+  static constexpr unsigned kAllFree = 0x5555, kAllOccupied = 0xAAAA;
   /// An inner node whose children are still coming.
   struct Open {
     std::uint64_t code;  // as many bits as its depth has levels
@@ -192,11 +193,12 @@ class NodeBytes {
     std::memcpy(bytes.data(), &log_odds, sizeof log_odds);
     bytes_.append(bytes.data(), bytes.size());
   }
-  /// The whole of space is one leaf.
+  /// The whole of space is one leaf. The root of a .bt file has no state of its own, but eight parts have.
   void add_all(const mapping::MapLeaf& leaf) {
     bytes_.clear();
     if (is_binary_) {
-      bytes_.assign(2, '\0');
+      bytes_.assign(2, static_cast<char>((leaf.is_occupied ? kAllOccupied : kAllFree) & 255U));
+      nodes_ = 9;
     } else {
       put(leaf.log_odds);
     }
@@ -212,7 +214,6 @@ class NodeBytes {
     open_.back().highest = std::max(open_.back().highest, log_odds);
   }
   void close() {
-    constexpr unsigned kAllFree = 0x5555, kAllOccupied = 0xAAAA;
     const Open node = open_.back();
     open_.pop_back();
     unsigned kind = kInner;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <unordered_map>
+#include <utility>
 
 #include "pade/mapping/query/tile_tree.hpp"
 #include "pade/mapping/query/voxel_grid.hpp"
@@ -87,6 +89,29 @@ std::uint64_t from_above(const Tile& tile, int first, int last, bool unknown_blo
   return bits;
 }
 
+/// Where a voxel lies, as one number; it may lie one beside what can be addressed.
+std::uint64_t place_of(const VoxelIndex& v) {
+  const auto part = [](int i) { return static_cast<std::uint64_t>(i + 2); };
+  return part(v[0]) | part(v[1]) << 20U | part(v[2]) << 40U;
+}
+
+/// Voxels that are not in a group yet: the place of each, and where it stands in the list.
+using Ungrouped = std::unordered_map<std::uint64_t, std::size_t>;
+
+/// Moves what touches a voxel from `left` to `reached`.
+void take_neighbours(const VoxelIndex& v, Ungrouped& left, std::vector<std::size_t>& reached) {
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        const auto beside = left.find(place_of({v[0] + x, v[1] + y, v[2] + z}));
+        if (beside == left.end()) continue;
+        reached.push_back(beside->second);
+        left.erase(beside);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::array<double, kSectors> sectors(const MapView& view, const Vector3d& place, double reach, double below,
@@ -152,6 +177,34 @@ std::vector<Vector3d> frontiers(const MapView& view, const Eigen::AlignedBox3d& 
     }
   }
   return found;
+}
+
+std::vector<FrontierGroup> frontier_groups(std::span<const Vector3d> found, double voxel) {
+  std::vector<FrontierGroup> groups;
+  Ungrouped left;
+  for (std::size_t i = 0; i < found.size(); ++i) left.emplace(place_of(voxel_beside(found[i], voxel)), i);
+  std::vector<std::size_t> reached;
+  for (const Vector3d& first : found) {
+    const auto seed = left.find(place_of(voxel_beside(first, voxel)));
+    if (seed == left.end()) continue;
+    reached.assign(1, seed->second);
+    left.erase(seed);
+    FrontierGroup group{0, Vector3d::Zero(), {}};
+    while (!reached.empty()) {
+      const Vector3d centre = found[reached.back()];
+      reached.pop_back();
+      ++group.voxels;
+      group.centre += centre;
+      group.bounds.extend(Vector3d(centre.array() - 0.5 * voxel));
+      group.bounds.extend(Vector3d(centre.array() + 0.5 * voxel));
+      take_neighbours(voxel_beside(centre, voxel), left, reached);
+    }
+    group.centre /= static_cast<double>(group.voxels);
+    groups.push_back(group);
+  }
+  std::stable_sort(groups.begin(), groups.end(),
+                   [](const FrontierGroup& a, const FrontierGroup& b) { return a.voxels > b.voxels; });
+  return groups;
 }
 
 }  // namespace pade::mapping

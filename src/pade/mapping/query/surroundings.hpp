@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -28,5 +30,18 @@ std::array<double, kSectors> sectors(const MapView& view, const Eigen::Vector3d&
 /// Centres of the free voxels in a box (world, m; none where it is NaN) that share a face with an unknown
 /// one, z slowest.
 std::vector<Eigen::Vector3d> frontiers(const MapView& view, const Eigen::AlignedBox3d& box);
+
+/// Voxels of a frontier that hang together: by a face, an edge or a corner.
+struct FrontierGroup {
+  std::size_t voxels = 0;      ///< how many
+  Eigen::Vector3d centre;      ///< mean of their centres, world, m
+  Eigen::AlignedBox3d bounds;  ///< of their cubes, world, m
+};
+
+/// The groups of what frontiers() found, the largest first; of the same size in the order of their first
+/// voxels.
+/// @param found  centres of voxels, each once
+/// @param voxel  side, m
+std::vector<FrontierGroup> frontier_groups(std::span<const Eigen::Vector3d> found, double voxel);
 
 }  // namespace pade::mapping

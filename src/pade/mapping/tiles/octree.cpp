@@ -47,7 +47,8 @@ void take_over(const octomap::OcTree& octree, VoxelStore& store) {
   for (auto leaf = octree.begin_leafs(), end = octree.end_leafs(); leaf != end; ++leaf) {
     const octomap::OcTreeKey key = leaf.getKey();
     const unsigned below = bits_below(leaf.getDepth());
-    store.set(morton_code({key[0], key[1], key[2]}) >> below << below, leaf.getDepth(), leaf->getLogOdds());
+    const float log_odds = leaf->getLogOdds() + 0.0F;  // -0 becomes 0: there is one of each value
+    store.set(morton_code({key[0], key[1], key[2]}) >> below << below, leaf.getDepth(), log_odds);
   }
 }
 

@@ -379,6 +379,9 @@ void VoxelStore::set(std::uint64_t code, unsigned depth, float log_odds) {
       VoxelTile& now = opened_tile(entry);
       for (std::uint64_t at = code; at < code + voxels_of(depth); ++at) put(now, at & 511U, log_odds);
       close_eighth(now, code >> 6U & 7U);
+      if (!now.is_uniform()) return;
+      free_parts(entry, kTileDepth);
+      entry = {Entry::kUniform, log_odds};
     });
     return;
   }
