@@ -2,6 +2,10 @@
 
 add_library(pade_warnings INTERFACE)
 target_compile_options(pade_warnings INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+# Kernels join conditions without branches.
+target_compile_options(pade_warnings INTERFACE
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-instead-of-logical>
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-bitwise-conditional-parentheses>)
 if(PADE_WERROR)
   target_compile_options(pade_warnings INTERFACE -Werror)
 endif()
