@@ -120,7 +120,8 @@ double LocalPlanner::clear_length(const Place& place, const std::vector<MotionSt
     fastest = std::max(fastest, speed);
     if (speed > kStanding) last = state.velocity / speed;
   }
-  path_.push_back(path_.back() + options_.vehicle.overshoot * fastest * last);
+  const Vector3d beyond = path_.back() + options_.vehicle.overshoot * fastest * last;
+  path_.push_back(beyond);
   return place.space.clear_length(path_, radius, options_.unknown_is_free);
 }
 
@@ -305,7 +306,8 @@ bool LocalPlanner::back_off(const Task& task) {
   constexpr double kShortest = 0.5;                           // m
   constexpr double kLess = 0.3;                               // m
   constexpr std::array kAskew = {0.0, 0.5, -0.5, 1.0, -1.0};  // rad
-  const double most = std::min(kShare * (hops_here_ / kHopsBeforeRetreat), kLongest);
+  const int retreats = hops_here_ / kHopsBeforeRetreat;
+  const double most = std::min(kShare * retreats, kLongest);
   for (double way = most; way > kShortest; way -= kLess) {
     for (const double askew : kAskew) {
       const MotionCommand command{-kHopSpeed * std::cos(askew), kHopSpeed * std::sin(askew), 0, 0, 0};
