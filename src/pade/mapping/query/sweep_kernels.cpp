@@ -8,7 +8,7 @@ namespace {
 using namespace simd::PADE_ISA;
 
 constexpr int kColumns = kLanes < 8 ? kLanes : 8;  // of a row, in one register
-constexpr float kMargin = 1e-4F;  // of squares: rounding is a tenth of it
+constexpr float kMargin = 1e-4F;                   // of squares: rounding is a tenth of it
 
 PADE_INLINE float lane_x(int lane) { return static_cast<float>(lane % kColumns); }
 PADE_INLINE float lane_y(int lane) { return static_cast<float>(lane / kColumns); }
