@@ -79,7 +79,8 @@ class Filter {
                     py::arg("too_new") = h.too_new, py::arg("duplicates") = h.duplicates,
                     py::arg("unusable") = h.unusable, py::arg("restarts") = h.restarts,
                     py::arg("restarts_when_lost") = h.restarts_when_lost,
-                    py::arg("times_lost") = h.times_lost, py::arg("velocity_doubted") = h.velocity_doubted);
+                    py::arg("times_lost") = h.times_lost, py::arg("velocity_doubted") = h.velocity_doubted,
+                    py::arg("magnetometer_doubted") = h.magnetometer_doubted);
   }
   [[nodiscard]] Time newest() {
     return without_gil(mutex_, [&] { return navigator_.newest(); });

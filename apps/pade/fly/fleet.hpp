@@ -22,7 +22,7 @@ namespace pade::cli {
 
 /// Raised by every change after which a flight of the same options ends otherwise: a folder holds flights of
 /// one revision.
-inline constexpr int flight_revision = 8;
+inline constexpr int flight_revision = 9;
 
 /// What flies.
 enum class Flier {

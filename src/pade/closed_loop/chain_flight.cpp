@@ -324,7 +324,11 @@ void ChainLoop::look_at_navigation() {
       status == navigation::NavigationStatus::dead_reckoning || status == navigation::NavigationStatus::lost;
   if (alone != alone_)
     say(fmt::format("navigation {} (velocity: {:.2f} m/s, 1 sigma)",
-                    alone ? "has no satellites any more: dead reckoning" : "has satellites again", sigma));
+                    !alone ? "knows its motion again"
+                    : status == navigation::NavigationStatus::lost
+                        ? "is lost: its measurements contradict each other"
+                        : "has no satellites any more: dead reckoning",
+                    sigma));
   alone_ = alone;
   const bool unheld = alone && sigma > kUnheld;
   if (unheld != unheld_)

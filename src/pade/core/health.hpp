@@ -41,6 +41,8 @@ struct Health {
   std::uint64_t restarts_when_lost = 0;  ///< of them, those of the second kind
   std::uint64_t times_lost = 0;          ///< times that the status became `lost`
   std::uint64_t velocity_doubted = 0;    ///< times that the GNSS velocities contradicted the positions
+  /// Times that the magnetometer contradicted the yaw of the GNSS velocities and the inertial sensors.
+  std::uint64_t magnetometer_doubted = 0;
 };
 
 /// What the filter made of one sensor.

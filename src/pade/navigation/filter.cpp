@@ -100,7 +100,9 @@ void Filter::propagate(Time to, const Vector3d& rate_mean, const Vector3d& force
   const Vector3d gravity(0, 0, -options_.gravity);
   const Matrix3d R = state.X.R.toRotationMatrix();
   state.X.p += dt * state.X.v + 0.5 * dt * dt * gravity + R * step.p;
-  state.X.v += dt * gravity + R * step.v;
+  const Vector3d change = dt * gravity + R * step.v;
+  state.X.v += change;
+  core_.integrity.yaw.inertial(change);
   state.X.R = (state.X.R * Quaterniond(step.R)).normalized();
   state.angular_rate = rate_end - state.gyroscope_bias;
   state.time = to;
@@ -110,6 +112,7 @@ void Filter::propagate(Time to, const Vector3d& rate_mean, const Vector3d& force
 }
 
 void Filter::add_gap_noise(double from, double to) {
+  core_.integrity.yaw.interrupt();
   const double rate = options_.gap_rate;
   const double acceleration = options_.gap_acceleration;
   const double squares = to * to - from * from;
@@ -208,9 +211,12 @@ Innovation Filter::correct(const Prediction<M>& prediction, const Eigen::Matrix<
 }
 
 template Innovation Filter::correct<3>(const Prediction<3>&, const Vector3d&, Matrix3d, double, bool);
+template Innovation Filter::correct<1>(const Prediction<1>&, const Eigen::Matrix<double, 1, 1>&,
+                                       Eigen::Matrix<double, 1, 1>, double, bool);
 
 void Filter::apply(const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1>& error) {
   const ExtendedPose before = core_.state.X;
+  core_.integrity.yaw.turned((before.R * error.segment<3>(kPhi)).z());
   core_.state.retract(error.head<kBase>());
   if (options_.raw_gnss) core_.raw.receiver.retract(error.segment<kRawStates>(kBase));
   if (options_.camera) core_.camera.retract(error.segment<kCameraStates>(camera_at()));
@@ -275,9 +281,15 @@ Innovation Filter::update(const MagneticField& field, double declination) {
   // The azimuth hangs on the horizontal part of the field alone: the field's error moves it as the iron does.
   const double lever = prediction->H.middleCols<3>(kIron).norm();
   const double sigma = lever * std::max(field.sigma, 1e-3);
-  const Innovation innovation = correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma),
-                                           options_.gate_probability_1);
-  judge_azimuth(core_.integrity.magnetometer, innovation);
+  // No innovation passes a gate of zero.
+  const double gate = core_.integrity.magnetometer_doubted ? 0 : options_.gate_probability_1;
+  const Innovation innovation =
+      correct<1>(*prediction, residual, Eigen::Matrix<double, 1, 1>(sigma * sigma), gate);
+  NavigationState without_iron = core_.state;
+  without_iron.iron.setZero();
+  const auto bare = predict_magnetic_azimuth(without_iron, field.field / norm);
+  const double turn = bare ? wrap_angle(north - bare->value[0]) : residual[0];
+  judge_magnetometer(innovation, turn, std::hypot(sigma, lever * options_.iron_sigma));
   return innovation;
 }
 

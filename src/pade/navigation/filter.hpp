@@ -166,6 +166,10 @@ class Filter {
   void judge_velocity(const Innovation& innovation);
   void judge_position(const Innovation& innovation);
   void judge_azimuth(InnovationWindow& window, const Innovation& innovation);
+  void judge_magnetometer(const Innovation& innovation, double turn, double sigma);
+  void doubt_magnetometer();
+  bool check_yaw(const GnssVelocity& velocity, const Prediction<3>& prediction);
+  void turn_to_velocities();
   void hear_dispute(Dispute::Ruling ruling);
   void compare_gnss(const Vector3d& position, const Matrix3d& white);
   void doubt_velocity();

@@ -112,6 +112,7 @@ class Navigator::Core {
   Health health_;
   std::uint64_t times_lost_before_ = 0;  ///< the last restart
   std::uint64_t doubted_before_ = 0;
+  std::uint64_t magnetometer_doubted_before_ = 0;
   RawTally tally_before_;
   std::function<void(const Measurement&)> sink_;
 };
@@ -131,6 +132,8 @@ void Navigator::Core::restart() {
   if (phase_ == AlignmentPhase::aligned) {
     times_lost_before_ += static_cast<std::uint64_t>(live_.core().integrity.times_lost);
     doubted_before_ += static_cast<std::uint64_t>(live_.core().integrity.times_doubted);
+    magnetometer_doubted_before_ +=
+        static_cast<std::uint64_t>(live_.core().integrity.times_magnetometer_doubted);
     tally_before_ = tally_before_ + live_.core().raw.tally;
   }
   phase_ = AlignmentPhase::waiting;
@@ -360,6 +363,8 @@ Health Navigator::Core::health() {
     const Integrity& integrity = live_.core().integrity;
     health_.times_lost = times_lost_before_ + static_cast<std::uint64_t>(integrity.times_lost);
     health_.velocity_doubted = doubted_before_ + static_cast<std::uint64_t>(integrity.times_doubted);
+    health_.magnetometer_doubted =
+        magnetometer_doubted_before_ + static_cast<std::uint64_t>(integrity.times_magnetometer_doubted);
     scratch_.restore(live_.snapshot());
     health_.status = status_of(scratch_);
     health_.yaw_sigma = yaw_of(scratch_).sigma;

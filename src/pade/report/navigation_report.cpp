@@ -116,11 +116,12 @@ std::string health_table(const NavigationRun& run) {
       "unusable</td><td>{} / {} / {} / {} / {}</td></tr>\n"
       "<tr><td>IMU samples refused, gaps</td><td>{}, {}</td></tr>\n"
       "<tr><td>measurements too late, repeated, not finite</td><td>{}, {}, {}</td></tr>\n"
-      "<tr><td>times lost / velocities doubted / starts anew</td><td>{} / {} / {}</td></tr>\n{}</table>\n",
+      "<tr><td>times lost / velocities doubted / magnetometer doubted / starts anew</td><td>{} / {} / {} / "
+      "{}</td></tr>\n{}</table>\n",
       to_name(h.status), run.frames.size(), run.health.frames_without_answer, run.health.speed_median,
       run.health.speed_largest, verdicts[0], verdicts[1], verdicts[2], verdicts[3], verdicts[4],
       h.imu_refused, h.imu_gaps, h.too_late, h.duplicates, h.unusable, h.times_lost, h.velocity_doubted,
-      h.restarts, jumps);
+      h.magnetometer_doubted, h.restarts, jumps);
 }
 
 }  // namespace

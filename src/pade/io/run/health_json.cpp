@@ -50,6 +50,7 @@ constexpr auto skipped_fields = [](auto& skipped, auto&& field) {
 
 Json json_of(const NavigationHealth& health) {
   Json json = json_by(navigation_fields, health);
+  json["magnetometer_doubted"] = health.filter.magnetometer_doubted;
   Json& sensors = json["sensors"] = Json::array();
   for (const navigation::SensorSummary& sensor : health.sensors) {
     sensors.push_back(json_by(sensor_fields, sensor));
@@ -74,6 +75,8 @@ void read_health(RunFields fields, RunHealth& health) {
   NavigationHealth& navigation = health.navigation.emplace();
   RunFields read = fields.object("navigation");
   read.read_all(navigation_fields, navigation);
+  if (read.has("magnetometer_doubted"))  // runs of before have none
+    read.read("magnetometer_doubted", navigation.filter.magnetometer_doubted, "a count");
   for (RunFields item : read.list("sensors")) item.read_all(sensor_fields, navigation.sensors.emplace_back());
 }
 

@@ -1,6 +1,7 @@
 // GNSS in the filter: the split of position errors, re-acquisition, and what contradictions lead to.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "pade/navigation/filter.hpp"
 
@@ -21,6 +22,12 @@ constexpr double kOpenedTilt = 0.03;  // rad
 constexpr double kOpenedRate = 0.02;  // rad/s
 constexpr double kOpenedForce = 0.2;  // m/s²
 constexpr int kMostDoublings = 3;
+// A yaw is turned to what the velocities show if it is wrong by more than this.
+constexpr double kLeastTurn = 0.2;        // rad
+constexpr double kTurnSigmas = 4.5;       // and by more than so many
+constexpr double kBentRate = 0.002;       // rad/s, of a bias that was to explain a wrong yaw
+constexpr double kAzimuthAgreement = 10;  // s, for which a doubted magnetometer must fit to be used again
+constexpr double kYawKnown = 0.1;         // rad, to which velocities may judge a magnetometer
 
 /// A covariance with each axis at or above the floor; nothing if it is not a covariance.
 Matrix3d floored(const Matrix3d& covariance, double floor) {
@@ -150,10 +157,15 @@ Innovation Filter::update(const GnssVelocity& velocity) {
   Integrity& integrity = core_.integrity;
   const Time now = core_.state.time;
   const Matrix3d noise = floored(velocity.covariance, options_.velocity_sigma_floor);
-  const Prediction<3> prediction = predict_gnss_velocity(core_.state, lever_arm_);
-  const Vector3d residual = velocity.velocity - prediction.value;
+  Prediction<3> prediction = predict_gnss_velocity(core_.state, lever_arm_);
+  Vector3d residual = velocity.velocity - prediction.value;
   // No innovation passes a gate of zero.
   const double gate = integrity.velocity_doubted ? 0 : options_.gate_probability_3;
+  if (check_yaw(velocity, prediction)) {
+    prediction = predict_gnss_velocity(core_.state, lever_arm_);
+    residual = velocity.velocity - prediction.value;
+    P_.diagonal().segment<3>(kNu).array() += residual.squaredNorm();
+  }
   Innovation innovation = correct<3>(prediction, residual, noise, gate);
   if (integrity.watching && innovation.verdict != Verdict::unusable) {
     integrity.velocity.add(counted(innovation, core_.velocity_rejections), now,
@@ -274,6 +286,82 @@ void Filter::judge_azimuth(InnovationWindow& window, const Innovation& innovatio
     window.forget();
   }
   integrity.settle(now);
+}
+
+/// Velocities and inertial sensors know the yaw where the vehicle changes its velocity, and need no compass.
+/// @param turn   that the magnetometer asks for if the vehicle has no iron, rad. @param sigma  of it, the
+/// iron's
+void Filter::judge_magnetometer(const Innovation& innovation, double turn, double sigma) {
+  Integrity& integrity = core_.integrity;
+  if (!integrity.watching || innovation.verdict == Verdict::unusable) return;
+  const Time now = core_.state.time;
+  if (integrity.magnetometer_doubted) {
+    if (innovation.chi_square > options_.gate_probability_1) integrity.magnetometer_agrees_since = now;
+    if (seconds_between(integrity.magnetometer_agrees_since, now) < kAzimuthAgreement) return;
+    integrity.magnetometer_doubted = false;
+    integrity.magnetometer.forget();
+    return;
+  }
+  const YawWitness& yaw = integrity.yaw;
+  if (!integrity.velocity_doubted && !integrity.position_doubted && yaw.is_clear() &&
+      yaw.sigma() < kYawKnown) {
+    const double apart = std::abs(std::remainder(turn - yaw.error(), 2 * std::numbers::pi));
+    if (apart > std::max(kLeastTurn, kTurnSigmas * std::hypot(sigma, yaw.sigma()))) {
+      doubt_magnetometer();
+      return turn_to_velocities();
+    }
+    const bool drifts = integrity.magnetometer.drift() > kOfOneComponent * options_.drift_bound;
+    const double asked = innovation.residual.x();
+    if (drifts && std::abs(yaw.error()) < std::abs(yaw.error() - asked)) return doubt_magnetometer();
+  }
+  judge_azimuth(integrity.magnetometer, innovation);
+}
+
+void Filter::doubt_magnetometer() {
+  Integrity& integrity = core_.integrity;
+  integrity.magnetometer_doubted = true;
+  ++integrity.times_magnetometer_doubted;
+  integrity.magnetometer.forget();
+  integrity.magnetometer_agrees_since = core_.state.time;
+  // What was taken for the vehicle's iron.
+  core_.state.iron.setZero();
+  P_.middleCols<3>(kIron).setZero();
+  P_.middleRows<3>(kIron).setZero();
+  P_.diagonal().segment<3>(kIron).setConstant(options_.iron_sigma * options_.iron_sigma);
+}
+
+/// A yaw that is far from what velocities and inertial sensors show is turned to it. @return whether it was
+bool Filter::check_yaw(const GnssVelocity& velocity, const Prediction<3>& prediction) {
+  Integrity& integrity = core_.integrity;
+  YawWitness& yaw = integrity.yaw;
+  const Vector3d axes = measured_axes(velocity);
+  if (axes.head<2>().minCoeff() <= 0 || integrity.velocity_doubted) return false;
+  const Vector3d of_body = velocity.velocity - (prediction.value - core_.state.X.v);
+  yaw.velocity(of_body, std::sqrt(0.5 * velocity.covariance.diagonal().head<2>().sum()), core_.state.time);
+  if (!integrity.watching || integrity.position_doubted || !yaw.is_clear()) return false;
+  const Vector3d up = core_.state.X.R.conjugate() * Vector3d::UnitZ();
+  const double believed = up.dot(P_.block<3, 3>(kPhi, kPhi) * up);
+  const double error = std::abs(yaw.error());
+  if (error < std::max(kLeastTurn, kTurnSigmas * yaw.sigma()) || error < kTurnSigmas * std::sqrt(believed))
+    return false;
+  if (!integrity.magnetometer.empty() && !integrity.magnetometer_doubted) doubt_magnetometer();
+  turn_to_velocities();
+  return true;
+}
+
+void Filter::turn_to_velocities() {
+  const double error = core_.integrity.yaw.error();
+  const double sigma = core_.integrity.yaw.sigma();
+  core_.integrity.raise(core_.state.time);
+  core_.integrity.velocity.forget();
+  const Vector3d up = core_.state.X.R.conjugate() * Vector3d::UnitZ();
+  P_.block<3, 3>(kPhi, kPhi) += error * error * up * up.transpose();
+  P_.block<3, 3>(kGyroscopeBias, kGyroscopeBias) += kBentRate * kBentRate * up * up.transpose();
+  Prediction<1> about_vertical;
+  about_vertical.H.setZero();
+  about_vertical.H.segment<3>(kPhi) = up.transpose();
+  correct<1>(about_vertical, Eigen::Matrix<double, 1, 1>(error), Eigen::Matrix<double, 1, 1>(sigma * sigma),
+             options_.gate_probability_1, true);
 }
 
 void Filter::open_inertial() {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pade/navigation/integrity/innovation_window.hpp"
+#include "pade/navigation/integrity/yaw_witness.hpp"
 
 namespace pade::navigation {
 
@@ -80,6 +81,7 @@ struct Integrity {
   InnovationWindow magnetometer;
   Dispute dispute;
   GnssAgreement agreement;
+  YawWitness yaw;
 
   bool watching = false;  ///< only from the end of the alignment on: its hypotheses are meant to fail
   bool lost = false;      ///< the covariance has been refuted, and not been confirmed since
@@ -96,6 +98,10 @@ struct Integrity {
   bool position_doubted = false;  ///< the same of the positions
   bool ever_agreed = false;       ///< velocities and positions of the GNSS, for a while
   Time last_opening;              ///< because of the velocities
+
+  bool magnetometer_doubted = false;  ///< its azimuth contradicts velocities and inertial sensors: not used
+  Time magnetometer_agrees_since;
+  int times_magnetometer_doubted = 0;
 
   /// Innovations of a sensor have refuted the covariance.
   void raise(Time now);

@@ -51,6 +51,7 @@ std::vector<SensorSummary> summarise(std::span<const Measurement> measurements);
 ///   restarts           the filter had to start anew after a gap
 ///   lost               the innovations refuted the covariance for a while
 ///   velocity-doubted   velocities of the GNSS that its positions contradict were left out
+///   magnetometer-doubted   a compass whose yaw velocities and inertial sensors contradict was left out
 ///   measurements-too-late, measurements-too-new   stamps so far from the IMU's that they were not used
 std::vector<Hint> check_run(std::span<const SensorSummary> sensors, const Health& health,
                             std::size_t imu_samples);

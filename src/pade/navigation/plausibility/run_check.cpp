@@ -64,6 +64,13 @@ void check_integrity(const Health& health, std::vector<Hint>& hints) {
                     health.velocity_doubted),
         "check axes and unit of the velocities, and what the receiver says of their quality");
   }
+  if (health.magnetometer_doubted > 0) {
+    say(hints, "magnetometer-doubted", HintSeverity::warning,
+        fmt::format("the magnetometer contradicted the yaw that GNSS velocities and inertial sensors show {} "
+                    "times and was not used until it agreed again",
+                    health.magnetometer_doubted),
+        "calibrate the compass, away from steel and currents; check axes and --declination");
+  }
 }
 
 }  // namespace
