@@ -13,7 +13,7 @@ constexpr double kMemory = 20;        // s
 constexpr double kForceError = 0.03;  // m/s², of tilt and bias together
 constexpr double kLengths = 1.4;      // by which the two may differ
 constexpr double kLeastCoherence = 0.8;
-constexpr double kOutlier = 4;  // sigmas
+constexpr double kWildSigmas = 4;  // sigmas
 
 }  // namespace
 
@@ -33,7 +33,7 @@ double YawWitness::variance_of(double seconds) const {
 bool YawWitness::is_plausible(const Open& change, double sigma) {
   const double measured = std::abs(change.measured);
   const double inertial = std::abs(change.inertial);
-  return std::abs(measured - inertial) < (1 - 1 / kLengths) * std::max(measured, inertial) + kOutlier * sigma;
+  return std::abs(measured - inertial) < (1 - 1 / kLengths) * std::max(measured, inertial) + kWildSigmas * sigma;
 }
 
 /// Noise has made the measured changes longer, by what is expected of it.
