@@ -187,7 +187,8 @@ TEST(TreeAgreement, ATreeThatIsTakenOverComesBackAsItWas) {
   EXPECT_EQ(all.at({1, 2, 3}), Occupancy::free);
 }
 
-/// Which of 64 voxels are free, point by point.
+/// Which cubes and which of 64 voxels are free: the same bits on each instruction set, whatever else is
+/// asked.
 TEST(LookKernels, GiveTheSameBitsOnEachInstructionSet) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -198,36 +199,49 @@ TEST(LookKernels, GiveTheSameBitsOnEachInstructionSet) {
   EndsLevel level;
   level.nearest = level.farthest[0] = ends.data();
   level.stride = kWidth + 8;
-  LookView view{90, 90, 49.5, 34.5, kWidth, kHeight, 20, 0.1, {0.8, 0.8, 0.7}, {}, {}, &level, 1};
+  LookView view{90, 90, 49.5, 34.5, kWidth, kHeight, 20, 0.1, {}, {0.8, 0.8, 0.7}, {}, {}, &level, 1};
   for (auto& side : view.sides) side[2] = 1;
+  std::vector look{&baseline::look_at_eight};
+  std::vector free_of{&baseline::free_voxels};
+#if defined(__x86_64__)
+  if (simd::available(simd::InstructionSet::avx2, simd::best())) {
+    look.push_back(&avx2::look_at_eight);
+    free_of.push_back(&avx2::free_voxels);
+  }
+  if (simd::available(simd::InstructionSet::avx512, simd::best())) {
+    look.push_back(&avx512::look_at_eight);
+    free_of.push_back(&avx512::free_voxels);
+  }
+#endif
   std::uint64_t any = 0;
+  unsigned any_cube = 0, no_cube = 0;
   for (int i = 0; i < 3000; ++i) {
-    std::array<double, 24> corners{};
-    std::array<double, 24> offsets{};
+    std::array<double, 24> centres{};
     const Vector3d place(0.6 * unit(random), 0.4 * unit(random), 5.2 + 0.8 * unit(random));
     for (std::size_t k = 0; k < 24; ++k) {
-      corners[k] = place[static_cast<int>(k % 3)] + 0.005 * unit(random);
-      offsets[k] = 0.005 * unit(random);
+      centres[k] = place[static_cast<int>(k / 8)] + 0.005 * unit(random);
+      view.offsets[k] = 0.005 * unit(random);
     }
-    VoxelCentres expected;
-    baseline::place_voxels(corners.data(), offsets.data(), expected);
-    const std::uint64_t free = baseline::free_voxels(view, expected, ~std::uint64_t{0});
+    const auto inside = static_cast<unsigned>(random() & 255U);
+    const std::uint64_t free = free_of[0](view, centres.data(), ~std::uint64_t{0}, inside);
     any |= free != 0 && ~free != 0 ? 1U : 0U;
-    EXPECT_EQ(baseline::free_voxels(view, expected, 0x00ff00ff00ff00ffU), free & 0x00ff00ff00ff00ffU);
-#if defined(__x86_64__)
-    if (simd::available(simd::InstructionSet::avx2, simd::best())) {
-      VoxelCentres centres;
-      avx2::place_voxels(corners.data(), offsets.data(), centres);
-      EXPECT_EQ(avx2::free_voxels(view, centres, ~std::uint64_t{0}), free);
+    EXPECT_EQ(free_of[0](view, centres.data(), 0x00ff00ff00ff00ffU, inside), free & 0x00ff00ff00ff00ffU);
+    for (const auto& kernel : free_of)
+      EXPECT_EQ(kernel(view, centres.data(), ~std::uint64_t{0}, inside), free);
+    const Eighths cubes = look[0](view, centres.data(), 0.2, 255);
+    EXPECT_EQ(cubes.free & cubes.nothing, 0U);
+    any_cube |= cubes.free;
+    no_cube |= cubes.nothing;
+    for (const auto& kernel : look) {
+      const Eighths same = kernel(view, centres.data(), 0.2, 0x5a);
+      EXPECT_EQ(same.free, cubes.free & 0x5aU);
+      EXPECT_EQ(same.nothing, cubes.nothing & 0x5aU);
+      EXPECT_EQ(same.inside, cubes.inside & 0x5aU);
     }
-    if (simd::available(simd::InstructionSet::avx512, simd::best())) {
-      VoxelCentres centres;
-      avx512::place_voxels(corners.data(), offsets.data(), centres);
-      EXPECT_EQ(avx512::free_voxels(view, centres, ~std::uint64_t{0}), free);
-    }
-#endif
   }
   EXPECT_EQ(any, 1U);
+  EXPECT_EQ(any_cube, 255U);
+  EXPECT_EQ(no_cube, 255U);
 }
 
 }  // namespace

@@ -298,32 +298,6 @@ void Clearance::build_pyramid(int width, int height) {
   }
 }
 
-/// Over the pixels u0..u1 x v0..v1, or a few more (whole cells of the level at which they are at most 4 x 4
-/// cells): the nearest; and the farthest of the nearest of cells that each voxel down to z_far holds whole.
-Clearance::Extremes Clearance::over(int u0, int v0, int u1, int v1, double z_far) const {
-  std::size_t level = 0;
-  int extent = std::max(u1 - u0, v1 - v0);
-  while (extent > 3 && level + 1 < levels_.size()) {
-    extent /= 2;
-    ++level;
-  }
-  const auto for_each_cell = [&](std::size_t at, const float* cells, const auto& visit) {
-    for (int v = v0 >> at; v <= v1 >> at; ++v) {
-      for (int u = u0 >> at; u <= u1 >> at; ++u) visit(cells[std::ptrdiff_t{v} * levels_[at].stride + u]);
-    }
-  };
-  Extremes both{kInfinity, 0};
-  for_each_cell(level, levels_[level].nearest.data(),
-                [&](float end) { both.nearest = std::min(both.nearest, end); });
-  const bool is_cut = u0 == 0 || v0 == 0 || u1 == camera_.width - 1 || v1 == camera_.height - 1;
-  const double covered = std::min(camera_.fx, camera_.fy) * parameters_.voxel / z_far * (is_cut ? 0.5 : 1.0);
-  const std::size_t scale = std::min(static_cast<std::size_t>(scale_of(covered)), levels_.size() - 1);
-  level = std::max(level, scale);
-  for_each_cell(level, farthest(level, scale),
-                [&](float end) { both.farthest = std::max(both.farthest, end); });
-  return both;
-}
-
 LookView Clearance::for_voxels(std::vector<EndsLevel>& levels) const {
   levels.clear();
   for (std::size_t i = 0; i < levels_.size(); ++i) {
@@ -342,6 +316,11 @@ LookView Clearance::for_voxels(std::vector<EndsLevel>& levels) const {
   view.height = camera_.height;
   view.range = parameters_.range;
   view.voxel = parameters_.voxel;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner((i & 1) != 0 ? 1 : -1, (i & 2) != 0 ? 1 : -1, (i & 4) != 0 ? 1 : -1);
+    const Eigen::Vector3d offset = 2 * parameters_.voxel * (0.25 * R_camera_world_ * corner);
+    for (int axis = 0; axis < 3; ++axis) view.offsets[8 * axis + i] = offset[axis];
+  }
   for (int axis = 0; axis < 3; ++axis) view.reach[axis] = reach_[axis];
   for (int i = 0; i < 4; ++i) {
     view.sides[i][0] = side_x_[i];
@@ -352,43 +331,6 @@ LookView Clearance::for_voxels(std::vector<EndsLevel>& levels) const {
   view.levels = levels.data();
   view.level_count = static_cast<int>(levels.size());
   return view;
-}
-
-View Clearance::look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const {
-  const Eigen::Vector3d half = side * reach_;
-  const double z_near = centre.z() - half.z();
-  const double z_far = centre.z() + half.z();
-  if (z_far <= 0 || z_near >= parameters_.range) return View::nothing;
-  const Eigen::Vector4d inside = side_x_ * centre.x() + side_y_ * centre.y() + side_z_ * centre.z();
-  if ((inside + side * side_reach_).minCoeff() < 0) return View::nothing;
-  if (is_voxel && inside.minCoeff() < 0) return View::nothing;  // its centre is outside the image
-  if (z_near <= 0.02 * z_far) return is_voxel ? View::nothing : View::partly;
-
-  // The pixels of the box around the cube along the camera's axes, which are no fewer than those of the cube.
-  const double per_near = 1 / z_near;
-  const double per_far = 1 / z_far;
-  constexpr double kRounding = 1e-9;
-  // Not negative after clamp: truncation rounds, in a fraction of the time of lround.
-  // NOLINTBEGIN(bugprone-incorrect-roundings)
-  const auto first = [&](double x, double f, double c, int size) {
-    x -= kRounding;
-    return static_cast<int>(std::clamp(f * x * (x < 0 ? per_near : per_far) + c, 0.0, size - 1.0) + 0.5);
-  };
-  const auto last = [&](double x, double f, double c, int size) {
-    x += kRounding;
-    return static_cast<int>(std::clamp(f * x * (x < 0 ? per_far : per_near) + c, 0.0, size - 1.0) + 0.5);
-  };
-  // NOLINTEND(bugprone-incorrect-roundings)
-  const Camera& c = camera_;
-  const Extremes seen = over(first(centre.x() - half.x(), c.fx, c.cx, c.width),
-                             first(centre.y() - half.y(), c.fy, c.cy, c.height),
-                             last(centre.x() + half.x(), c.fx, c.cx, c.width),
-                             last(centre.y() + half.y(), c.fy, c.cy, c.height), z_far);
-  if (seen.farthest <= z_near) return View::nothing;
-  const bool before_all = seen.nearest > z_far;
-  if (is_voxel) return before_all ? View::free : View::nothing;
-  const bool whole = (inside - side * side_reach_).minCoeff() >= 0;
-  return before_all && whole ? View::free : View::partly;
 }
 
 }  // namespace pade::mapping

@@ -1,5 +1,5 @@
-// How far each pixel shows space to be free, with a pyramid over it: tells for a cube of space whether all of
-// it, part of it or nothing of it is free.
+// How far each pixel shows space to be free, with a pyramid over it that tells for a cube of space whether
+// all of it, part of it or nothing of it is free.
 #pragma once
 
 #include <array>
@@ -16,13 +16,6 @@
 
 namespace pade::mapping {
 
-/// What a depth image says about a cube.
-enum class View {
-  nothing,  ///< no voxel in it is shown free
-  partly,   ///< look at its parts
-  free,     ///< every point of it lies before what the pixels that look at it have measured
-};
-
 /// The free part of the viewing rays of one depth image: up to the bound, or to Z - k sigma where the image
 /// has no bounds; at most the range.
 class Clearance {
@@ -31,7 +24,7 @@ class Clearance {
     double range = 20;         ///< m along the optical axis
     double margin_sigmas = 2;  ///< k
     double hole = 0.05;        ///< a thing that is smaller than this is not looked for, m
-    double voxel = 0.1;        ///< side of the smallest cube that look_at() will be asked about, m
+    double voxel = 0.1;        ///< side of the smallest cube that will be asked about, m
   };
 
   /// `image` as OccupancyMap::integrate() takes it. Buffers are kept from call to call.
@@ -46,18 +39,11 @@ class Clearance {
   /// Of the camera, in the world.
   [[nodiscard]] const Eigen::Vector3d& origin() const { return origin_; }
 
-  /// @param centre    of a cube along the axes of the world, in the camera's frame, metres
-  /// @param side      metres
-  /// @param is_voxel  a voxel is not divided further: the answer is `free` or `nothing`
-  [[nodiscard]] View look_at(const Eigen::Vector3d& centre, double side, bool is_voxel) const;
-  /// What answers for 64 voxels at once, the same. Valid until set(), and as long as `levels` is.
+  /// What answers for cubes of space, eight at once (tiles/look_kernels.hpp). Valid until set(), and as long
+  /// as `levels` is.
   LookView for_voxels(std::vector<EndsLevel>& levels) const;
 
  private:
-  struct Extremes {
-    float nearest;
-    float farthest;
-  };
   struct Level {
     int width = 0;
     int height = 0;
@@ -87,7 +73,6 @@ class Clearance {
   void build_pyramid(int width, int height);
   void halve(std::size_t level);
   [[nodiscard]] const float* farthest(std::size_t level, std::size_t scale) const;
-  [[nodiscard]] Extremes over(int u0, int v0, int u1, int v1, double z_far) const;
 
   Camera camera_;  // of the cells
   Parameters parameters_;

@@ -22,11 +22,6 @@ double quantile_at(int u, int v) {
   return kQuantiles[kBayer[static_cast<std::size_t>(v % 4 * 4 + u % 4)]];
 }
 
-VoxelKey unpacked(std::uint64_t key) {
-  return {static_cast<std::uint16_t>(key), static_cast<std::uint16_t>(key >> 16U),
-          static_cast<std::uint16_t>(key >> 32U)};
-}
-
 /// A row of an image, or null where there is none.
 template <class Value>
 const Value* row_of(const cv::Mat& image, int v) {
@@ -58,7 +53,10 @@ void HitFinder::find(const DepthImage& image, const Camera& cells, const Pose& T
     for (std::size_t eighth = 0; eighth < 8; ++eighth) {
       for (std::uint64_t rest = tile->hit[eighth]; rest != 0; rest &= rest - 1) {
         const std::size_t index = 64 * eighth + static_cast<std::size_t>(std::countr_zero(rest));
-        HitVoxel voxel = voxel_of(morton_key(tile->code + index), tile->counts[index], cells, T_world_camera);
+        const VoxelKey key{static_cast<std::uint16_t>(tile->key[0] | gathered_bits(index)),
+                           static_cast<std::uint16_t>(tile->key[1] | gathered_bits(index >> 1U)),
+                           static_cast<std::uint16_t>(tile->key[2] | gathered_bits(index >> 2U))};
+        HitVoxel voxel = voxel_of(key, tile->counts[index], cells, T_world_camera);
         if (!is_hit(voxel, around)) continue;
         voxel.code = tile->code + index;
         voxels_.push_back(voxel);
@@ -117,8 +115,7 @@ void HitFinder::add_row(int count, bool is_spread, MapChange& change) {
   std::uint32_t points = 0;
   std::uint32_t certainty = 0;
   const auto add = [&] {
-    if (key < kPointOutside)
-      grid_.add(unpacked(key), points, is_spread ? certainty : points * HitGrid::kCertain);
+    if (key < kPointOutside) grid_.add(key, points, is_spread ? certainty : points * HitGrid::kCertain);
     if (key == kPointOutside) change.outside += points;
   };
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -156,10 +153,7 @@ bool HitFinder::is_hit(const HitVoxel& voxel, const HitGrid::Around& around) con
     return true;  // spread on purpose: where most of it is, the looks will tell
   const auto most = voxel.count / std::max(options_.hit_min_of_peak, 1e-9);  // that a neighbour may have
   const VoxelKey& key = voxel.key;
-  for (int i = 0; i < 27; ++i) {
-    if (points_at(around, key, key[0] + i % 3 - 1, key[1] + i / 3 % 3 - 1, key[2] + i / 9 - 1) > most)
-      return false;
-  }
+  if (has_fuller_neighbour(around, key, most)) return false;
   // Farther out on the ray only the tails of the noise are left, and a thin thing before a wall must not be
   // taken for one: a fifth of what is asked of a neighbour is enough there.
   const double side = options_.voxel;

@@ -10,18 +10,22 @@ namespace {
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
 struct Kernels {
-  decltype(&baseline::place_voxels) place;
-  decltype(&baseline::move_voxels) move;
-  decltype(&baseline::move_corners) move_corners;
+  decltype(&baseline::move_eight) move_eight;
   decltype(&baseline::look_at_eight) look_at_eight;
   decltype(&baseline::free_voxels) free;
 };
 
 Kernels kernels() {
   const simd::InstructionSet set = simd::best();
-  return {PADE_DISPATCH(place_voxels, set), PADE_DISPATCH(move_voxels, set), PADE_DISPATCH(move_corners, set),
-          PADE_DISPATCH(look_at_eight, set), PADE_DISPATCH(free_voxels, set)};
+  return {PADE_DISPATCH(move_eight, set), PADE_DISPATCH(look_at_eight, set), PADE_DISPATCH(free_voxels, set)};
 }
+
+/// What is known of a cube.
+enum class View {
+  nothing,  ///< no voxel in it is shown free
+  partly,   ///< look at its parts
+  free,     ///< every point of it lies before what the pixels that look at it have measured
+};
 
 /// Bit i becomes byte i.
 std::uint64_t bytes_of(unsigned bits) {
@@ -32,8 +36,17 @@ std::uint64_t bytes_of(unsigned bits) {
   return (spread & 0x0101010101010101U) * 255U;
 }
 
-/// Walks space from the top as an octree, all in the camera's frame, down to tiles; below by 64 voxels at
-/// once.
+/// Bits of eight cubes.
+constexpr unsigned kEach = 255;
+
+/// Bit i says whether byte i has any.
+unsigned bytes_in_use(std::uint64_t bits) {
+  constexpr std::uint64_t kLow = 0x7f7f7f7f7f7f7f7fU;
+  const std::uint64_t high_bits = (((bits & kLow) + kLow) | bits) & ~kLow;
+  return static_cast<unsigned>((high_bits >> 7U) * 0x0102040810204080U >> 56U);
+}
+
+/// Walks space from the top as an octree, by the eight parts of a cube at once, all in the camera's frame.
 class FreeSpaceSearch {
  public:
   FreeSpaceSearch(const Clearance& now, std::span<const Clearance* const> earlier, bool alone, bool again,
@@ -47,36 +60,30 @@ class FreeSpaceSearch {
         view_(now.for_voxels(levels_)) {
     for (std::size_t i = 0; i < 8; ++i) {
       const Eigen::Vector3d corner((i & 1U) != 0 ? 1 : -1, (i & 2U) != 0 ? 1 : -1, (i & 4U) != 0 ? 1 : -1);
-      to_child_[i] = 0.25 * now.R_camera_world() * corner;
-      const Eigen::Vector3d to_voxel = 2 * voxel * to_child_[i];
-      for (std::size_t axis = 0; axis < 3; ++axis) to_voxel_[8 * axis + i] = to_voxel[static_cast<int>(axis)];
+      to_part_[i] = 0.25 * now.R_camera_world() * corner;
     }
     witnesses_.reserve(earlier.size());
     for (const Clearance* clearance : earlier) {
       Witness& witness = witnesses_.emplace_back();
-      witness.clearance = clearance;
-      witness.R_witness_now = clearance->R_camera_world() * now.R_camera_world().transpose();
-      witness.t_witness_now = clearance->in_camera(now.origin());
+      const Eigen::Matrix3d R_witness_now = clearance->R_camera_world() * now.R_camera_world().transpose();
+      const Eigen::Vector3d t_witness_now = clearance->in_camera(now.origin());
       witness.view = clearance->for_voxels(witness.levels);
       for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column)
-          witness.motion.r[3 * row + column] = witness.R_witness_now(row, column);
-        witness.motion.t[row] = witness.t_witness_now[row];
+          witness.motion.r[3 * row + column] = R_witness_now(row, column);
+        witness.motion.t[row] = t_witness_now[row];
       }
     }
   }
 
   std::size_t search() {
     const auto all = static_cast<std::uint32_t>((std::uint64_t{1} << witnesses_.size()) - 1);
-    visit({0, now_.in_camera(Eigen::Vector3d::Zero()), 2.0 * kTreeCentre * voxel_, 0}, View::partly, all);
+    visit_parts({0, now_.in_camera(Eigen::Vector3d::Zero()), 2.0 * kTreeCentre * voxel_, 0}, false, all);
     return pending_;
   }
 
  private:
   struct Witness {
-    const Clearance* clearance = nullptr;
-    Eigen::Matrix3d R_witness_now;
-    Eigen::Vector3d t_witness_now;
     LookMotion motion{};
     std::vector<EndsLevel> levels;
     LookView view{};
@@ -87,115 +94,140 @@ class FreeSpaceSearch {
     double side;
     unsigned depth;
   };
+  using Points = std::array<double, 24>;  // eight: all x, all y, all z
+  /// The eight parts of a cube, as the image and its witnesses see them.
+  struct Parts {
+    Points centres;  // in the camera's frame
+    Eighths now;
+    std::array<Eighths, 32> witnessed;
+    unsigned wanted;          // what the image knows nothing of is left out
+    std::uint32_t asked = 0;  // of the witnesses
+  };
 
   [[nodiscard]] Cube part_of(const Cube& cube, std::uint64_t i) const {
-    return {cube.code | i << bits_below(cube.depth + 1), cube.centre + cube.side * to_child_[i],
+    return {cube.code | i << bits_below(cube.depth + 1), cube.centre + cube.side * to_part_[i],
             0.5 * cube.side, cube.depth + 1};
   }
-  [[nodiscard]] View look_from(const Witness& witness, const Cube& cube) const {
-    return witness.clearance->look_at(witness.R_witness_now * cube.centre + witness.t_witness_now, cube.side,
-                                      false);
+  [[nodiscard]] Points centres_of_parts(const Cube& cube) const {
+    Points centres;
+    for (std::size_t j = 0; j < 8; ++j) {
+      const Eigen::Vector3d centre = cube.centre + cube.side * to_part_[j];
+      for (std::size_t axis = 0; axis < 3; ++axis) centres[8 * axis + j] = centre[static_cast<int>(axis)];
+    }
+    return centres;
+  }
+  [[nodiscard]] Points moved(const Witness& witness, const Points& centres) const {
+    Points there;
+    kernels_.move_eight(witness.motion, centres.data(), there.data());
+    return there;
   }
 
-  /// What the witnesses in `open` say: free where one of them does. Those that know nothing leave `open`.
-  View ask(const Cube& cube, std::uint32_t& open) const {
+  /// @param free  whether the image shows all of the cube free
+  /// @param wanted  of the parts
+  void look_at_parts(const Cube& cube, bool free, unsigned wanted, Parts& parts) const {
+    parts.centres = centres_of_parts(cube);
+    parts.now = free ? Eighths{kEach, 0, kEach}
+                     : kernels_.look_at_eight(view_, parts.centres.data(), 0.5 * cube.side, wanted);
+    parts.wanted = wanted & ~parts.now.nothing;
+    parts.asked = 0;
+  }
+  const Eighths& ask(std::size_t i, const Cube& cube, Parts& parts) const {
+    const std::uint32_t bit = std::uint32_t{1} << i;
+    if ((parts.asked & bit) == 0) {
+      const Points there = moved(witnesses_[i], parts.centres);
+      parts.witnessed[i] =
+          kernels_.look_at_eight(witnesses_[i].view, there.data(), 0.5 * cube.side, parts.wanted);
+      parts.asked |= bit;
+    }
+    return parts.witnessed[i];
+  }
+  /// What the witnesses in `open` say of a part: free where one of them does. Those that know nothing leave
+  /// `open`.
+  View ask_all(const Cube& cube, Parts& parts, std::size_t part, std::uint32_t& open) const {
     for (std::size_t i = 0; i < witnesses_.size(); ++i) {
       const std::uint32_t bit = std::uint32_t{1} << i;
       if ((open & bit) == 0) continue;
-      const View view = look_from(witnesses_[i], cube);
-      if (view == View::free) return View::free;
-      if (view == View::nothing) open &= ~bit;
+      const Eighths& seen = ask(i, cube, parts);
+      if ((seen.free >> part & 1U) != 0) return View::free;
+      if ((seen.nothing >> part & 1U) != 0) open &= ~bit;
     }
     return open == 0 ? View::nothing : View::partly;
   }
 
-  /// @param seen  what is known already of the cube that this one is a part of
-  void visit(const Cube& cube, View seen, std::uint32_t open) {
+  /// @param free  whether the image shows all of the cube free
+  /// @param open  witnesses that may know something of it
+  void visit_parts(const Cube& cube, bool free, std::uint32_t open) {
+    Parts parts;
+    look_at_parts(cube, free, kEach, parts);
+    for (unsigned rest = parts.wanted; rest != 0; rest &= rest - 1)
+      visit(cube, parts, static_cast<std::size_t>(std::countr_zero(rest)), open);
+  }
+
+  void visit(const Cube& whole, Parts& parts, std::size_t part, std::uint32_t open) {
+    const Cube cube = part_of(whole, part);
     const bool has_entry = cube.depth % 3 == 1 && cube.depth >= 4;
     if (!again_ && has_entry && store_.is_least(store_.find(cube.code, cube.depth))) return;
-    if (seen != View::free) seen = now_.look_at(cube.centre, cube.side, false);
-    if (seen == View::nothing) return;
-    if (seen == View::free) {
-      const View confirmed = alone_ ? View::free : ask(cube, open);
+    const bool free = (parts.now.free >> part & 1U) != 0;
+    if (free) {
+      const View confirmed = alone_ ? View::free : ask_all(whole, parts, part, open);
       if (confirmed == View::free) {
-        FreeCube& free = out_.emplace_back(FreeCube{cube.code, cube.depth, {}});
-        if (cube.depth == kTileDepth) free.voxels.fill(kAll);
+        FreeCube& found = out_.emplace_back(FreeCube{cube.code, cube.depth, {}});
+        if (cube.depth == kTileDepth) found.voxels.fill(kAll);
       }
       if (confirmed == View::nothing)
         pending_ += voxels_of(cube.depth) - store_.count_least(cube.code, cube.depth);
       if (confirmed != View::partly) return;
     }
-    if (cube.depth == kTileDepth) return visit_tile(cube, seen, open);
-    for (std::uint64_t i = 0; i < 8; ++i) visit(part_of(cube, i), seen, open);
+    if (cube.depth == kTileDepth) return visit_tile(cube, free, open);
+    visit_parts(cube, free, open);
   }
 
-  void visit_tile(const Cube& tile, View seen, std::uint32_t open) {
+  void visit_tile(const Cube& tile, bool is_free, std::uint32_t open) {
     const VoxelStore::Entry& entry = store_.find(tile.code, kTileDepth);
     const VoxelTile* known = entry.has_parts() ? &store_.tile(entry) : nullptr;
     FreeCube free{tile.code, kTileDepth, {}};
-    std::uint64_t any = 0;
+    std::array<std::uint64_t, 8> all_asked{};
+    unsigned wanted = 0;
     for (std::size_t i = 0; i < 8; ++i) {
-      const std::uint64_t asked = known != nullptr && !again_ ? ~known->least[i] : kAll;
-      if (asked == 0) continue;
-      const Cube cube = part_of(tile, i);
-      const std::uint64_t shown = shown_by_now(cube, seen, asked);
+      all_asked[i] = known != nullptr && !again_ ? ~known->least[i] : kAll;
+      wanted |= static_cast<unsigned>(all_asked[i] != 0) << i;
+    }
+    Parts parts;
+    look_at_parts(tile, is_free, wanted, parts);
+    std::uint64_t any = 0;
+    for (unsigned open_parts = parts.wanted; open_parts != 0; open_parts &= open_parts - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(open_parts));
+      const std::uint64_t asked = all_asked[i];
+      const Points centres = centres_of_parts(part_of(tile, i));
+      const bool whole = (parts.now.free >> i & 1U) != 0;
+      const std::uint64_t shown = whole ? asked : free_in(view_, centres, asked);
       if (shown == 0) continue;
-      free.voxels[i] = alone_ ? shown : confirmed(cube, shown, open);
+      free.voxels[i] = alone_ ? shown : confirmed(tile, parts, i, centres, shown, open);
       pending_ += static_cast<std::size_t>(std::popcount(shown & ~free.voxels[i]));
       any |= free.voxels[i];
     }
     if (any != 0) out_.push_back(free);
   }
 
-  /// Takes up a cube of 4 x 4 x 4 voxels, to be asked about by the functions below.
-  void take(const Cube& cube) {
-    for (std::size_t j = 0; j < 8; ++j) {
-      const Eigen::Vector3d corner = cube.centre + cube.side * to_child_[j];
-      for (std::size_t axis = 0; axis < 3; ++axis) corners_[3 * j + axis] = corner[static_cast<int>(axis)];
-    }
-    is_placed_ = false;
-  }
-  const VoxelCentres& placed() {
-    if (!is_placed_) kernels_.place(corners_.data(), to_voxel_.data(), centres_);
-    is_placed_ = true;
-    return centres_;
-  }
-
-  /// Of the voxels asked for, those that are free in a view: cubes of 2 x 2 x 2 first.
-  template <class Place>
-  std::uint64_t free_in(const LookView& view, const double* corners, std::uint64_t asked,
-                        const Place& place) const {
-    unsigned free = 0;
-    unsigned nothing = 0;
-    kernels_.look_at_eight(view, corners, &free, &nothing);
-    const std::uint64_t whole = bytes_of(free) & asked;
-    const std::uint64_t open = asked & ~bytes_of(free | nothing);
-    return open == 0 ? whole : whole | kernels_.free(view, place(), open);
-  }
-
-  std::uint64_t shown_by_now(const Cube& cube, View seen, std::uint64_t asked) {
-    if (seen != View::free) seen = now_.look_at(cube.centre, cube.side, false);
-    if (seen == View::nothing) return 0;
-    take(cube);
-    if (seen == View::free) return asked;
-    return free_in(view_, corners_.data(), asked, [&]() -> const VoxelCentres& { return placed(); });
+  /// Of the voxels asked for of 4 x 4 x 4, those that are free in a view: cubes of 2 x 2 x 2 first.
+  [[nodiscard]] std::uint64_t free_in(const LookView& view, const Points& centres,
+                                      std::uint64_t asked) const {
+    const Eighths eighths = kernels_.look_at_eight(view, centres.data(), 2 * voxel_, bytes_in_use(asked));
+    const std::uint64_t whole = bytes_of(eighths.free) & asked;
+    const std::uint64_t open = asked & ~bytes_of(eighths.free | eighths.nothing);
+    return open == 0 ? whole : whole | kernels_.free(view, centres.data(), open, eighths.inside);
   }
 
   /// Of `shown`, what a witness shows too.
-  std::uint64_t confirmed(const Cube& cube, std::uint64_t shown, std::uint32_t open) {
+  std::uint64_t confirmed(const Cube& tile, Parts& parts, std::size_t part, const Points& centres,
+                          std::uint64_t shown, std::uint32_t open) const {
     std::uint64_t rest = shown;
     for (std::size_t i = 0; i < witnesses_.size() && rest != 0; ++i) {
       if ((open >> i & 1U) == 0) continue;
-      const Witness& witness = witnesses_[i];
-      const View view = look_from(witness, cube);
-      if (view == View::free) return shown;
-      if (view == View::nothing) continue;
-      std::array<double, 24> corners{};
-      kernels_.move_corners(witness.motion, corners_.data(), corners.data());
-      rest &= ~free_in(witness.view, corners.data(), rest, [&]() -> const VoxelCentres& {
-        kernels_.move(witness.motion, placed(), moved_);
-        return moved_;
-      });
+      const Eighths& seen = ask(i, tile, parts);
+      if ((seen.free >> part & 1U) != 0) return shown;
+      if ((seen.nothing >> part & 1U) != 0) continue;
+      rest &= ~free_in(witnesses_[i].view, moved(witnesses_[i], centres), rest);
     }
     return shown & ~rest;
   }
@@ -207,14 +239,10 @@ class FreeSpaceSearch {
   const VoxelStore& store_;
   std::vector<FreeCube>& out_;
   Kernels kernels_ = kernels();
-  std::array<Eigen::Vector3d, 8> to_child_;  // from the centre of a cube of side 1 to those of its eighths
-  std::array<double, 24> to_voxel_{};  // from the centre of 2 x 2 x 2 voxels to theirs: all x, all y, all z
+  std::array<Eigen::Vector3d, 8> to_part_;  // from the centre of a cube of side 1 to those of its eighths
   std::vector<EndsLevel> levels_;
   LookView view_;
   std::vector<Witness> witnesses_;
-  std::array<double, 24> corners_{};  // centres of its eight cubes of 2 x 2 x 2, in the camera's frame
-  VoxelCentres centres_{}, moved_{};
-  bool is_placed_ = false;
   std::size_t pending_ = 0;
 };
 

@@ -5,10 +5,25 @@
 
 namespace pade::mapping {
 
-void HitGrid::add(const VoxelKey& key, std::uint32_t points, std::uint32_t certainty) {
-  const std::uint64_t tile = morton_code(key) >> 9U << 9U;
-  if (last_ == nullptr || last_->code != tile) last_ = &opened(tile);
-  const std::size_t index = index_in_tile(key[0], key[1], key[2]);
+namespace {
+
+/// Of the tile that holds a voxel, from the packed key of the voxel.
+constexpr std::uint64_t kCorner = ~std::uint64_t{0x000700070007};
+
+std::uint64_t packed(const VoxelKey& key) {
+  return key[0] | static_cast<std::uint64_t>(key[1]) << 16U | static_cast<std::uint64_t>(key[2]) << 32U;
+}
+
+}  // namespace
+
+void HitGrid::add(std::uint64_t key, std::uint32_t points, std::uint32_t certainty) {
+  const std::uint64_t corner = key & kCorner;
+  if (last_ == nullptr || corner != last_corner_) {
+    last_ = &opened(corner);
+    last_corner_ = corner;
+  }
+  const std::size_t index = index_in_tile(static_cast<int>(key & 7U), static_cast<int>(key >> 16U & 7U),
+                                          static_cast<int>(key >> 32U & 7U));
   Count& count = last_->counts[index];
   count.points += points;
   count.certainty += certainty;
@@ -16,34 +31,35 @@ void HitGrid::add(const VoxelKey& key, std::uint32_t points, std::uint32_t certa
 }
 
 /// Where the tile is, or the empty slot where it would be.
-std::size_t HitGrid::slot_of(std::uint64_t tile) const {
+std::size_t HitGrid::slot_of(std::uint64_t corner) const {
   const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = (tile * 0x9e3779b97f4a7c15U >> 20U) & mask;
-  while (slots_[slot] != 0 && tiles_[slots_[slot] - 1]->code != tile) slot = (slot + 1) & mask;
+  std::size_t slot = ((corner >> 3U) * 0x9e3779b97f4a7c15U >> 40U) & mask;
+  while (slots_[slot].tile != nullptr && slots_[slot].corner != corner) slot = (slot + 1) & mask;
   return slot;
 }
 
-const HitGrid::Tile* HitGrid::find(std::uint64_t tile) const {
-  const std::uint32_t found = slots_[slot_of(tile)];
-  return found == 0 ? nullptr : tiles_[found - 1].get();
-}
+const HitGrid::Tile* HitGrid::find(std::uint64_t corner) const { return slots_[slot_of(corner)].tile; }
 
-HitGrid::Tile& HitGrid::opened(std::uint64_t tile) {
+HitGrid::Tile& HitGrid::opened(std::uint64_t corner) {
   if (2 * used_ >= slots_.size()) grow();
-  const std::size_t slot = slot_of(tile);
-  if (slots_[slot] == 0) {
+  Slot& slot = slots_[slot_of(corner)];
+  if (slot.tile == nullptr) {
     if (used_ == tiles_.size()) tiles_.push_back(std::make_unique<Tile>());
-    tiles_[used_]->code = tile;
-    slots_[slot] = static_cast<std::uint32_t>(++used_);
+    slot = {corner, tiles_[used_++].get()};
+    slot.tile->key = {static_cast<std::uint16_t>(corner), static_cast<std::uint16_t>(corner >> 16U),
+                      static_cast<std::uint16_t>(corner >> 32U)};
+    slot.tile->code = morton_code(slot.tile->key);
   }
-  return *tiles_[slots_[slot] - 1];
+  return *slot.tile;
 }
 
 void HitGrid::grow() {
   constexpr std::size_t kSmallest = 1U << 12U;
-  slots_.assign(std::max(kSmallest, 4 * slots_.size()), 0U);
-  for (std::size_t i = 0; i < used_; ++i)
-    slots_[slot_of(tiles_[i]->code)] = static_cast<std::uint32_t>(i + 1);
+  slots_.assign(std::max(kSmallest, 4 * slots_.size()), Slot{});
+  for (std::size_t i = 0; i < used_; ++i) {
+    const std::uint64_t corner = packed(tiles_[i]->key);
+    slots_[slot_of(corner)] = {corner, tiles_[i].get()};
+  }
 }
 
 void HitGrid::clear() {
@@ -54,7 +70,7 @@ void HitGrid::clear() {
         tile.counts[64 * eighth + static_cast<std::size_t>(std::countr_zero(tile.hit[eighth]))] = {};
     }
   }
-  std::fill(slots_.begin(), slots_.end(), 0U);
+  std::fill(slots_.begin(), slots_.end(), Slot{});
   used_ = 0;
   last_ = nullptr;
 }
@@ -69,13 +85,13 @@ std::vector<const HitGrid::Tile*> HitGrid::tiles() const {
 
 HitGrid::Around HitGrid::around(const Tile& tile) const {
   constexpr int kSide = 8;
-  const VoxelKey key = morton_key(tile.code);
+  const VoxelKey& key = tile.key;
   Around all{};
   for (int i = 0; i < 27; ++i) {
     const VoxelKey beside{static_cast<std::uint16_t>(key[0] + kSide * (i % 3 - 1)),
                           static_cast<std::uint16_t>(key[1] + kSide * (i / 3 % 3 - 1)),
                           static_cast<std::uint16_t>(key[2] + kSide * (i / 9 - 1))};
-    all[static_cast<std::size_t>(i)] = i == 13 ? &tile : find(morton_code(beside));
+    all[static_cast<std::size_t>(i)] = i == 13 ? &tile : find(packed(beside));
   }
   return all;
 }

@@ -5,7 +5,7 @@ namespace {
 
 constexpr int kRow = 8;  // voxels at once
 
-/// The pixels that eight voxels cover, and where they end.
+/// The pixels that eight cubes cover, and where they end.
 struct Rows {
   int first_u[kRow], last_u[kRow], first_v[kRow], last_v[kRow];  // NOLINT(*-avoid-c-arrays)
   double z_far[kRow];                                            // NOLINT(*-avoid-c-arrays)
@@ -23,7 +23,8 @@ struct Cube {
   double per_near, per_far;  // 1 / Z of its ends
 };
 
-/// The arithmetic of Clearance::look_at().
+/// The pixels of the box around a cube along the axes of the camera, which are no fewer than those of the
+/// cube.
 [[gnu::always_inline]] inline void set_pixels(const LookView& view, const Cube& cube, int i, Rows& out) {
   constexpr double kRounding = 1e-9;
   const double most_u = view.width - 1.0;
@@ -47,21 +48,27 @@ struct Cube {
   return view.sides[side][0] * x + view.sides[side][1] * y + view.sides[side][2] * z;
 }
 
-[[gnu::always_inline]] inline void project(const LookView& view, const double* x, const double* y,
-                                           const double* z, Rows& out) {
+template <bool kInside>
+[[gnu::always_inline]] inline void project(const LookView& view, const double* centre, Rows& out) {
   const double half_x = view.voxel * view.reach[0];
   const double half_y = view.voxel * view.reach[1];
   const double half_z = view.voxel * view.reach[2];
   for (int i = 0; i < kRow; ++i) {
-    const double z_near = z[i] - half_z;
-    const double z_far = z[i] + half_z;
-    const int is_inside = (along(view, 0, x[i], y[i], z[i]) >= 0) & (along(view, 1, x[i], y[i], z[i]) >= 0) &
-                          (along(view, 2, x[i], y[i], z[i]) >= 0) & (along(view, 3, x[i], y[i], z[i]) >= 0);
+    const double x = centre[0] + view.offsets[i];
+    const double y = centre[kRow] + view.offsets[kRow + i];
+    const double z = centre[2 * kRow] + view.offsets[2 * kRow + i];
+    const double z_near = z - half_z;
+    const double z_far = z + half_z;
+    int is_inside = 1;
+    if (!kInside) {
+      is_inside = (along(view, 0, x, y, z) >= 0) & (along(view, 1, x, y, z) >= 0) &
+                  (along(view, 2, x, y, z) >= 0) & (along(view, 3, x, y, z) >= 0);
+    }
     out.is_seen[i] = is_inside & (z_far > 0) & (z_near < view.range) & (z_near > 0.02 * z_far);
     out.z_far[i] = z_far;
     const double per_near = 1 / (out.is_seen[i] != 0 ? z_near : 1);
     const double per_far = 1 / (out.is_seen[i] != 0 ? z_far : 1);
-    set_pixels(view, {x[i], y[i], z[i], half_x, half_y, per_near, per_far}, i, out);
+    set_pixels(view, {x, y, z, half_x, half_y, per_near, per_far}, i, out);
   }
 }
 
@@ -69,9 +76,9 @@ using Eight [[gnu::vector_size(4 * kRow)]] = float;
 
 /// Nothing is added to the first i cells, so that the others are never the nearest.
 constexpr float kFar = __builtin_inff();
-constexpr Eight kBeyond[kRow] = {
+constexpr Eight kBeyond[kRow + 1] = {
     // NOLINT(*-avoid-c-arrays)
-    {0, 0, 0, 0, 0, 0, 0, 0},
+    {kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar},
     {0, kFar, kFar, kFar, kFar, kFar, kFar, kFar},
     {0, 0, kFar, kFar, kFar, kFar, kFar, kFar},
     {0, 0, 0, kFar, kFar, kFar, kFar, kFar},
@@ -79,123 +86,156 @@ constexpr Eight kBeyond[kRow] = {
     {0, 0, 0, 0, 0, kFar, kFar, kFar},
     {0, 0, 0, 0, 0, 0, kFar, kFar},
     {0, 0, 0, 0, 0, 0, 0, kFar},
+    {0, 0, 0, 0, 0, 0, 0, 0},
 };
 
-/// Cells of a level that hold the pixels of a cube, and a few more: Clearance::over().
+using Ints [[gnu::vector_size(4 * kRow)]] = int;
+
+[[gnu::always_inline]] inline void read(const int* from, Ints& all) {
+  __builtin_memcpy(&all, from, sizeof all);
+}
+
+/// Cells of a level of eight cubes: whole ones that hold their pixels, and a few more.
 struct Cells {
-  const float* first;
-  int stride, columns, rows;
+  Ints level, u, v, columns, rows;
 };
 
-[[gnu::always_inline]] inline int level_of(const LookView& view, const Rows& pixels, int i) {
-  const int columns = pixels.last_u[i] - pixels.first_u[i];
-  const int rows = pixels.last_v[i] - pixels.first_v[i];
-  int level = 0;
-  for (int extent = columns > rows ? columns : rows; extent > 3 && level + 1 < view.level_count; extent /= 2)
-    ++level;
-  return level;
+/// The pixels that eight cubes cover.
+struct Extents {
+  Ints first_u, last_u, first_v, last_v;
+  /// At which the pixels of a cube are at most 4 x 4 cells and an edge.
+  Ints level;
+};
+
+[[gnu::always_inline]] inline void set_extents(const LookView& view, const Rows& pixels, Extents& all) {
+  read(pixels.first_u, all.first_u);
+  read(pixels.last_u, all.last_u);
+  read(pixels.first_v, all.first_v);
+  read(pixels.last_v, all.last_v);
+  const Ints columns = all.last_u - all.first_u;
+  const Ints rows = all.last_v - all.first_v;
+  const Eight extent = __builtin_convertvector(columns > rows ? columns : rows, Eight);
+  // The exponent of the extent less one: how often it is halved until it is below four.
+  Ints bits;
+  __builtin_memcpy(&bits, &extent, sizeof bits);
+  const Ints level = (bits >> 23) - 128;
+  const Ints most = Ints{} + (view.level_count - 1);
+  all.level = level < 0 ? Ints{} : level > most ? most : level;
 }
 
-[[gnu::always_inline]] inline Cells cells_of(const float* cells, int stride, int level, const Rows& pixels,
-                                             int i) {
-  const int u = pixels.first_u[i] >> level;
-  const int v = pixels.first_v[i] >> level;
-  return {cells + v * stride + u, stride, (pixels.last_u[i] >> level) - u + 1,
-          (pixels.last_v[i] >> level) - v + 1};
+[[gnu::always_inline]] inline void set_cells(const Extents& pixels, const Ints& level, Cells& out) {
+  out.level = level;
+  out.u = pixels.first_u >> level;
+  out.v = pixels.first_v >> level;
+  out.columns = (pixels.last_u >> level) - out.u + 1;
+  out.rows = (pixels.last_v >> level) - out.v + 1;
 }
 
-[[gnu::always_inline]] inline Cells nearest_cells(const LookView& view, const Rows& pixels, int i) {
-  const int level = level_of(view, pixels, i);
-  const EndsLevel& ends = view.levels[level];
-  return cells_of(ends.nearest, ends.stride, level, pixels, i);
-}
-
-/// Of the scale that each voxel of a cube holds all of a cell of.
-[[gnu::always_inline]] inline Cells farthest_cells(const LookView& view, const Rows& pixels, int i) {
+/// The farthest of the nearest in cells of a scale: a voxel that covers three pixels along each axis holds
+/// all of a cell of 2 x 2, and where the nearest of each such cell lies before it, it is not free. At most
+/// eight columns and rows.
+[[gnu::always_inline]] inline void set_farthest(const LookView& view, const Rows& rows, const Extents& pixels,
+                                                Ints& scale, Cells& out) {
   const double focal = view.f_x < view.f_y ? view.f_x : view.f_y;
-  const bool is_cut = pixels.first_u[i] == 0 || pixels.first_v[i] == 0 ||
-                      pixels.last_u[i] == view.width - 1 || pixels.last_v[i] == view.height - 1;
-  const double covered = focal * view.voxel / pixels.z_far[i] * (is_cut ? 0.5 : 1.0);
-  int scale = scale_of(covered);
-  if (scale > view.level_count - 1) scale = view.level_count - 1;
-  int level = level_of(view, pixels, i);
-  if (level < scale) level = scale;
-  const EndsLevel& ends = view.levels[level];
-  return cells_of(ends.farthest[scale], ends.stride, level, pixels, i);
+  int wanted[kRow];  // NOLINT(*-avoid-c-arrays)
+  for (int i = 0; i < kRow; ++i) {
+    const int is_cut = (rows.first_u[i] == 0) | (rows.first_v[i] == 0) | (rows.last_u[i] == view.width - 1) |
+                       (rows.last_v[i] == view.height - 1);
+    const double covered = focal * view.voxel / rows.z_far[i] * (is_cut != 0 ? 0.5 : 1.0);
+    wanted[i] = (covered >= 3 ? 1 : 0) + (covered >= 7 ? 1 : 0) + (covered >= 15 ? 1 : 0);
+  }
+  const Ints most = Ints{} + (view.level_count - 1);
+  read(wanted, scale);
+  scale = scale > most ? most : scale;
+  const Ints fine = pixels.level > 0 ? pixels.level - 1 : pixels.level;
+  set_cells(pixels, fine, out);
+  const Ints level = (out.columns > kRow) | (out.rows > kRow) ? pixels.level : fine;
+  set_cells(pixels, level < scale ? scale : level, out);
 }
 
-/// Nearest of the cells: of at most five columns.
-[[gnu::always_inline]] inline float nearest_of(const Cells& cells) {
+/// Nearest of a few rows of cells: of at most eight columns.
+[[gnu::always_inline]] inline float nearest_of(const float* cells, int stride, int columns, int rows) {
   Eight least;
-  __builtin_memcpy(&least, cells.first, sizeof least);
-  for (int v = 1; v < cells.rows; ++v) {
+  __builtin_memcpy(&least, cells, sizeof least);
+  for (int v = 1; v < rows; ++v) {
     Eight next;
-    __builtin_memcpy(&next, cells.first + v * cells.stride, sizeof next);
+    __builtin_memcpy(&next, cells + v * stride, sizeof next);
     least = next < least ? next : least;
   }
-  least += kBeyond[cells.columns];
-  float nearest = least[0];
-  for (int k = 1; k < 5; ++k) nearest = least[k] < nearest ? least[k] : nearest;
-  return nearest;
+  least += kBeyond[columns];
+  Eight other = __builtin_shufflevector(least, least, 4, 5, 6, 7, 0, 1, 2, 3);
+  least = other < least ? other : least;
+  other = __builtin_shufflevector(least, least, 2, 3, 0, 1, 6, 7, 4, 5);
+  least = other < least ? other : least;
+  return least[0] < least[1] ? least[0] : least[1];
 }
 
-[[gnu::always_inline]] inline float farthest_of(const Cells& cells) {
+[[gnu::always_inline]] inline float farthest_of(const float* cells, int stride, int columns, int rows) {
   Eight most;
-  __builtin_memcpy(&most, cells.first, sizeof most);
-  for (int v = 1; v < cells.rows; ++v) {
+  __builtin_memcpy(&most, cells, sizeof most);
+  for (int v = 1; v < rows; ++v) {
     Eight next;
-    __builtin_memcpy(&next, cells.first + v * cells.stride, sizeof next);
+    __builtin_memcpy(&next, cells + v * stride, sizeof next);
     most = next > most ? next : most;
   }
-  most -= kBeyond[cells.columns];
-  float farthest = most[0];
-  for (int k = 1; k < 5; ++k) farthest = most[k] > farthest ? most[k] : farthest;
-  return farthest;
+  most -= kBeyond[columns];
+  Eight other = __builtin_shufflevector(most, most, 4, 5, 6, 7, 0, 1, 2, 3);
+  most = other > most ? other : most;
+  other = __builtin_shufflevector(most, most, 2, 3, 0, 1, 6, 7, 4, 5);
+  most = other > most ? other : most;
+  return most[0] > most[1] ? most[0] : most[1];
+}
+
+template <bool kInside>
+[[gnu::always_inline]] inline unsigned free_of_eight(const LookView& view, const double* centre,
+                                                     unsigned asked) {
+  Rows rows;
+  project<kInside>(view, centre, rows);
+  Extents pixels;
+  Cells cells;
+  set_extents(view, rows, pixels);
+  set_cells(pixels, pixels.level, cells);
+  // All cells are asked for before the first is looked at: they are spread over more memory than is near.
+  const float* first[kRow];  // NOLINT(*-avoid-c-arrays)
+  unsigned seen = 0;
+  for (unsigned rest = asked; rest != 0; rest &= rest - 1) {
+    const int i = __builtin_ctz(rest);
+    if (rows.is_seen[i] == 0) continue;
+    seen |= 1U << i;
+    const EndsLevel& ends = view.levels[cells.level[i]];
+    first[i] = ends.nearest + cells.v[i] * ends.stride + cells.u[i];
+    __builtin_prefetch(first[i]);
+  }
+  unsigned free = 0;
+  for (; seen != 0; seen &= seen - 1) {
+    const int i = __builtin_ctz(seen);
+    if (!(first[i][0] > rows.z_far[i])) continue;
+    const int stride = view.levels[cells.level[i]].stride;
+    if (nearest_of(first[i], stride, cells.columns[i], cells.rows[i]) > rows.z_far[i]) free |= 1U << i;
+  }
+  return free;
 }
 
 }  // namespace
 
-void place_voxels(const double* corners, const double* offsets, VoxelCentres& out) {
-  for (int j = 0; j < 8; ++j) {
-    for (int k = 0; k < 8; ++k) {
-      out.x[8 * j + k] = corners[3 * j] + offsets[k];
-      out.y[8 * j + k] = corners[3 * j + 1] + offsets[8 + k];
-      out.z[8 * j + k] = corners[3 * j + 2] + offsets[16 + k];
-    }
+void move_eight(const LookMotion& motion, const double* from, double* out) {
+  for (int row = 0; row < 3; ++row) {
+    const double* r = motion.r + 3 * row;
+    for (int j = 0; j < kRow; ++j)
+      out[kRow * row + j] =
+          r[0] * from[j] + r[1] * from[kRow + j] + r[2] * from[2 * kRow + j] + motion.t[row];
   }
 }
 
-void move_voxels(const LookMotion& motion, const VoxelCentres& from, VoxelCentres& out) {
-  const double* r = motion.r;
-  for (int i = 0; i < 64; ++i) {
-    const double x = from.x[i];
-    const double y = from.y[i];
-    const double z = from.z[i];
-    out.x[i] = r[0] * x + r[1] * y + r[2] * z + motion.t[0];
-    out.y[i] = r[3] * x + r[4] * y + r[5] * z + motion.t[1];
-    out.z[i] = r[6] * x + r[7] * y + r[8] * z + motion.t[2];
-  }
-}
-
-void move_corners(const LookMotion& motion, const double* from, double* out) {
-  const double* r = motion.r;
-  for (int j = 0; j < 8; ++j) {
-    const double* p = from + 3 * j;
-    for (int row = 0; row < 3; ++row)
-      out[3 * j + row] = r[3 * row] * p[0] + r[3 * row + 1] * p[1] + r[3 * row + 2] * p[2] + motion.t[row];
-  }
-}
-
-void look_at_eight(const LookView& view, const double* corners, unsigned* free, unsigned* nothing) {
-  const double side = 2 * view.voxel;
+Eighths look_at_eight(const LookView& view, const double* centres, double side, unsigned wanted) {
   Rows pixels;
   double z_nears[kRow];  // NOLINT(*-avoid-c-arrays)
   int is_whole[kRow];    // NOLINT(*-avoid-c-arrays)
   int is_out[kRow];      // NOLINT(*-avoid-c-arrays)
   for (int i = 0; i < kRow; ++i) {
-    const double x = corners[3 * i];
-    const double y = corners[3 * i + 1];
-    const double z = corners[3 * i + 2];
+    const double x = centres[i];
+    const double y = centres[kRow + i];
+    const double z = centres[2 * kRow + i];
     const double z_near = z - side * view.reach[2];
     const double z_far = z + side * view.reach[2];
     int is_beyond = (z_far <= 0) | (z_near >= view.range);
@@ -214,51 +254,46 @@ void look_at_eight(const LookView& view, const double* corners, unsigned* free, 
     const double per_far = 1 / (pixels.is_seen[i] != 0 ? z_far : 1);
     set_pixels(view, {x, y, z, side * view.reach[0], side * view.reach[1], per_near, per_far}, i, pixels);
   }
-  unsigned all = 0;
-  unsigned none = 0;
-  Cells near_cells[kRow];  // NOLINT(*-avoid-c-arrays)
-  Cells far_cells[kRow];   // NOLINT(*-avoid-c-arrays)
-  for (int i = 0; i < kRow; ++i) {
-    if (pixels.is_seen[i] == 0) continue;
-    near_cells[i] = nearest_cells(view, pixels, i);
-    far_cells[i] = farthest_cells(view, pixels, i);
-  }
-  for (int i = 0; i < kRow; ++i) {
+  Extents extents;
+  Cells near_cells;
+  Cells far_cells;
+  Ints scales;
+  set_extents(view, pixels, extents);
+  set_cells(extents, extents.level, near_cells);
+  set_farthest(view, pixels, extents, scales, far_cells);
+  Eighths out{0, 0, 0};
+  for (; wanted != 0; wanted &= wanted - 1) {
+    const int i = __builtin_ctz(wanted);
     const unsigned bit = 1U << i;
-    if (is_out[i] != 0) none |= bit;
+    if (is_out[i] != 0) out.nothing |= bit;
+    if (is_whole[i] != 0) out.inside |= bit;
     if (pixels.is_seen[i] == 0) continue;
-    if (farthest_of(far_cells[i]) <= z_nears[i]) {
-      none |= bit;
-    } else if (is_whole[i] != 0 && nearest_of(near_cells[i]) > pixels.z_far[i]) {
-      all |= bit;
+    const EndsLevel& far = view.levels[far_cells.level[i]];
+    const float* farthest = far.farthest[scales[i]] + far_cells.v[i] * far.stride + far_cells.u[i];
+    if (farthest[0] <= z_nears[i] &&
+        farthest_of(farthest, far.stride, far_cells.columns[i], far_cells.rows[i]) <= z_nears[i]) {
+      out.nothing |= bit;
+      continue;
     }
+    if (is_whole[i] == 0) continue;
+    const EndsLevel& near = view.levels[near_cells.level[i]];
+    const float* nearest = near.nearest + near_cells.v[i] * near.stride + near_cells.u[i];
+    if (nearest[0] > pixels.z_far[i] &&
+        nearest_of(nearest, near.stride, near_cells.columns[i], near_cells.rows[i]) > pixels.z_far[i])
+      out.free |= bit;
   }
-  *free = all;
-  *nothing = none;
+  return out;
 }
 
-std::uint64_t free_voxels(const LookView& view, const VoxelCentres& centres, std::uint64_t asked) {
+std::uint64_t free_voxels(const LookView& view, const double* centres, std::uint64_t asked, unsigned inside) {
   std::uint64_t free = 0;
   for (int j = 0; j < 8; ++j) {
     const auto eight = static_cast<unsigned>(asked >> (8 * j) & 255U);
     if (eight == 0) continue;
-    Rows rows;
-    project(view, centres.x + 8 * j, centres.y + 8 * j, centres.z + 8 * j, rows);
-    // All cells are asked for before the first is looked at: they are spread over more memory than is near.
-    Cells cells[kRow];  // NOLINT(*-avoid-c-arrays)
-    unsigned seen = 0;
-    for (unsigned rest = eight; rest != 0; rest &= rest - 1) {
-      const int i = __builtin_ctz(rest);
-      if (rows.is_seen[i] == 0) continue;
-      seen |= 1U << i;
-      cells[i] = nearest_cells(view, rows, i);
-      __builtin_prefetch(cells[i].first);
-    }
-    for (; seen != 0; seen &= seen - 1) {
-      const int i = __builtin_ctz(seen);
-      if (cells[i].first[0] > rows.z_far[i] && nearest_of(cells[i]) > rows.z_far[i])
-        free |= std::uint64_t{1} << (8 * j + i);
-    }
+    const double* centre = centres + j;
+    const unsigned found = (inside >> j & 1U) != 0 ? free_of_eight<true>(view, centre, eight)
+                                                   : free_of_eight<false>(view, centre, eight);
+    free |= static_cast<std::uint64_t>(found) << (8 * j);
   }
   return free;
 }

@@ -1,5 +1,5 @@
-// Which of 64 voxels a depth image shows free, one after the other: compiled once per instruction set, same
-// bits on each.
+// Which cubes of space a depth image shows free, eight at once: compiled once per instruction set, same bits
+// on each.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,6 @@
 #include "pade/core/compute/simd.hpp"
 
 namespace pade::mapping {
-
-/// 4 x 4 x 4 voxels in Morton order: their centres in the frame of a camera, m.
-struct VoxelCentres {
-  double x[64];  // NOLINT(*-avoid-c-arrays)
-  double y[64];  // NOLINT(*-avoid-c-arrays)
-  double z[64];  // NOLINT(*-avoid-c-arrays)
-};
 
 /// A level of the pyramid over the free ends of the rays: cells of 2^level x 2^level pixels.
 struct EndsLevel {
@@ -25,16 +18,14 @@ struct EndsLevel {
   int stride = 0;  ///< cells from row to row
 };
 
-/// A voxel that covers so many pixels along each axis holds all of a cell of 2^scale x 2^scale: where the
-/// nearest of each cell lies before it, it is not free.
-inline int scale_of(double pixels) { return pixels >= 15 ? 3 : pixels >= 7 ? 2 : pixels >= 3 ? 1 : 0; }
-
 /// What of a Clearance the kernel needs.
 struct LookView {
   double f_x, f_y, c_x, c_y;  ///< pixels
   int width, height;          ///< pixels
   double range;               ///< m
   double voxel;               ///< m
+  /// From the centre of 2 x 2 x 2 voxels to theirs, along the axes of the camera: all x, all y, all z, m.
+  double offsets[24];  // NOLINT(*-avoid-c-arrays)
   double
       reach[3];  ///< half extents of a cube of side 1 along the axes of the camera NOLINT(*-avoid-c-arrays)
   double sides[4][3];    ///< inward normals of the viewing frustum NOLINT(*-avoid-c-arrays)
@@ -65,6 +56,13 @@ struct PixelRays {
 inline constexpr std::uint64_t kNoPoint = ~std::uint64_t{0};
 inline constexpr std::uint64_t kPointOutside = kNoPoint - 1;
 
+/// Of eight cubes, one bit each.
+struct Eighths {
+  unsigned free;     ///< all over
+  unsigned nothing;  ///< of it is free
+  unsigned inside;   ///< the view as a whole
+};
+
 /// A rigid motion: rows of the rotation, then the translation.
 struct LookMotion {
   double r[9];  // NOLINT(*-avoid-c-arrays)
@@ -72,16 +70,17 @@ struct LookMotion {
 };
 
 PADE_DECLARE_KERNEL(
-    /// `corners`: centres of the eight eighths, x, y, z; `offsets`: from them to their eight voxels, eight x,
-    /// y, z.
-    void place_voxels(const double* corners, const double* offsets, VoxelCentres& out);
-    void move_voxels(const LookMotion& motion, const VoxelCentres& from, VoxelCentres& out);
-    void move_corners(const LookMotion& motion, const double* from, double* out);
-    /// Of eight cubes of 2 x 2 x 2 voxels, by `corners`, one bit each: those that are free all over, and
-    /// those of which nothing is.
-    void look_at_eight(const LookView& view, const double* corners, unsigned* free, unsigned* nothing);
-    /// Of `asked`, bit by voxel, those that are free.
-    std::uint64_t free_voxels(const LookView& view, const VoxelCentres& centres, std::uint64_t asked);
+    /// Eight points: all x, all y, all z, here and below.
+    void move_eight(const LookMotion& motion, const double* from, double* out);
+    /// What of eight cubes is known.
+    /// @param centres  in the frame of the camera, m
+    /// @param side     of each, m: two voxels at least
+    /// @param wanted   of the eight, a bit each; what is said of the others is of no account
+    Eighths look_at_eight(const LookView& view, const double* centres, double side, unsigned wanted);
+    /// Of `asked` among 4 x 4 x 4 voxels, in Morton order a bit each, those that are free.
+    /// @param centres  of the eight cubes of 2 x 2 x 2. @param inside  those that lie in the view as a whole
+    std::uint64_t free_voxels(const LookView& view, const double* centres, std::uint64_t asked,
+                              unsigned inside);
     /// Z - margin_sigmas sigma of a row, from 0 to the range; NaN where nothing was measured (state 0) or
     /// sigma is not finite. `variance` and `state` may be null: exact, all measured.
     void measured_row(const float* depth, const float* variance, const unsigned char* state, int count,

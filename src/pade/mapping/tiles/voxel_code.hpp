@@ -44,12 +44,19 @@ inline Eigen::Vector3d centre_of(const VoxelKey& key, double voxel) {
   return voxel * (Eigen::Vector3d(key[0], key[1], key[2]).array() + (0.5 - kTreeCentre));
 }
 
+/// Three bits, two apart.
+inline constexpr std::array<std::uint16_t, 8> kSpreadBits{0, 1, 8, 9, 64, 65, 72, 73};
+
 /// Low nine bits of the Morton code of a voxel.
 inline std::size_t index_in_tile(int x, int y, int z) {
-  constexpr std::array<std::uint16_t, 8> kSpread{0, 1, 8, 9, 64, 65, 72, 73};
-  return static_cast<std::size_t>(kSpread[static_cast<unsigned>(x) & 7U] |
-                                  kSpread[static_cast<unsigned>(y) & 7U] << 1 |
-                                  kSpread[static_cast<unsigned>(z) & 7U] << 2);
+  return static_cast<std::size_t>(kSpreadBits[static_cast<unsigned>(x) & 7U] |
+                                  kSpreadBits[static_cast<unsigned>(y) & 7U] << 1 |
+                                  kSpreadBits[static_cast<unsigned>(z) & 7U] << 2);
+}
+
+/// The other way round: three bits that lie two apart.
+constexpr unsigned gathered_bits(std::size_t spread) {
+  return static_cast<unsigned>((spread & 1U) | (spread >> 2U & 2U) | (spread >> 4U & 4U));
 }
 
 }  // namespace pade::mapping
