@@ -282,6 +282,9 @@ TEST(RunCheck, SaysThatTheFilterWasLostAndWhy) {
   EXPECT_THAT(check_run({}, health, 1000), Not(has("velocity-doubted")));
   health.velocity_doubted = 1;
   EXPECT_THAT(check_run({}, health, 1000), has("velocity-doubted"));
+  EXPECT_THAT(check_run({}, health, 1000), Not(has("magnetometer-doubted")));
+  health.magnetometer_doubted = 1;
+  EXPECT_THAT(check_run({}, health, 1000), has("magnetometer-doubted"));
 }
 
 TEST(RunCheck, HasNothingToSayOfAGoodRun) {
