@@ -167,6 +167,7 @@ class Filter {
   void judge_position(const Innovation& innovation);
   void judge_azimuth(InnovationWindow& window, const Innovation& innovation);
   void judge_magnetometer(const Innovation& innovation, double turn, double sigma);
+  [[nodiscard]] bool velocities_deny(double turn) const;
   void doubt_magnetometer();
   bool check_yaw(const GnssVelocity& velocity, const Prediction<3>& prediction);
   void turn_to_velocities();

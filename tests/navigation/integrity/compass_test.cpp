@@ -113,7 +113,7 @@ TEST(YawWitness, IsNotMisledByVelocitiesThatJump) {
 /// How a flight with a compass went.
 struct Outcome {
   double until = 0;    ///< s up to which the yaw was wrong by more than 5 degrees
-  double worst = 0;    ///< rad, of the yaw, from 25 s on
+  double worst = 0;    ///< rad, of the yaw, from 30 s on
   double fastest = 0;  ///< error of the velocity in the body from take-off on, m/s
   Health health;
 };
@@ -147,7 +147,7 @@ Outcome fly(double turned, double since, std::uint64_t seed, const Vector3d& iro
     const Vector3d east = state.R_world_body.conjugate() * known.T_world_body.rotation * Vector3d::UnitX();
     const double yaw = std::abs(std::atan2(east.y(), east.x()));
     if (yaw > 5 * kDegree) outcome.until = t;
-    if (t > 25) outcome.worst = std::max(outcome.worst, yaw);
+    if (t > 30) outcome.worst = std::max(outcome.worst, yaw);
     const Vector3d error = known.T_world_body.rotation.conjugate() * known.velocity -
                            state.R_world_body.conjugate() * state.velocity;
     if (t > 5) outcome.fastest = std::max(outcome.fastest, error.norm());
@@ -172,9 +172,9 @@ TEST_P(WrongCompass, IsLeftOut) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Outcome outcome = fly(GetParam() * kDegree, 0, seed);
     EXPECT_GE(outcome.health.magnetometer_doubted, 1U) << seed;
-    EXPECT_LT(outcome.until, 22) << seed;
+    EXPECT_LT(outcome.until, 28) << seed;
     EXPECT_LT(outcome.worst, 5 * kDegree) << seed;
-    EXPECT_LT(outcome.fastest, 0.6) << seed;
+    EXPECT_LT(outcome.fastest, 0.65) << seed;
     EXPECT_EQ(outcome.health.restarts, 0U) << seed;
   }
 }
@@ -184,8 +184,8 @@ TEST(Compass, ThatGoesWrongInFlightIsLeftOut) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Outcome outcome = fly(40 * kDegree, 20, seed);
     EXPECT_GE(outcome.health.magnetometer_doubted, 1U) << seed;
-    EXPECT_LT(outcome.worst, 6 * kDegree) << seed;
-    EXPECT_LT(outcome.fastest, 0.4) << seed;
+    EXPECT_LT(outcome.until, 10) << seed << ": the yaw does not follow the compass";
+    EXPECT_LT(outcome.fastest, 0.3) << seed;
   }
 }
 

@@ -27,7 +27,7 @@ constexpr double kLeastTurn = 0.2;        // rad
 constexpr double kTurnSigmas = 4.5;       // and by more than so many
 constexpr double kBentRate = 0.002;       // rad/s, of a bias that was to explain a wrong yaw
 constexpr double kAzimuthAgreement = 10;  // s, for which a doubted magnetometer must fit to be used again
-constexpr double kYawKnown = 0.1;         // rad, to which velocities may judge a magnetometer
+constexpr double kYawKnown = 0.2;         // rad, to which velocities may judge a magnetometer
 
 /// A covariance with each axis at or above the floor; nothing if it is not a covariance.
 Matrix3d floored(const Matrix3d& covariance, double floor) {
@@ -274,6 +274,8 @@ void Filter::judge_azimuth(InnovationWindow& window, const Innovation& innovatio
   // A slow drift of the yaw must not be learnt as usual before it is noticed.
   window.add(innovation.white, now, usual(innovation, integrity.lost) && window.drift() < kLearnable);
   if (window.drift() > kOfOneComponent * options_.drift_bound) {
+    const bool is_magnetometer = &window == &integrity.magnetometer;
+    if (is_magnetometer && velocities_deny(innovation.residual.x())) return doubt_magnetometer();
     // What the yaw did to the horizon in the meantime is not known either.
     const Integrity before = integrity;
     open_inertial();
@@ -310,11 +312,15 @@ void Filter::judge_magnetometer(const Innovation& innovation, double turn, doubl
       doubt_magnetometer();
       return turn_to_velocities();
     }
-    const bool drifts = integrity.magnetometer.drift() > kOfOneComponent * options_.drift_bound;
-    const double asked = innovation.residual.x();
-    if (drifts && std::abs(yaw.error()) < std::abs(yaw.error() - asked)) return doubt_magnetometer();
   }
   judge_azimuth(integrity.magnetometer, innovation);
+}
+
+/// Whether the yaw is right by them, rather than wrong by `turn`.
+bool Filter::velocities_deny(double turn) const {
+  const YawWitness& yaw = core_.integrity.yaw;
+  return !core_.integrity.velocity_doubted && !core_.integrity.position_doubted && yaw.is_clear() &&
+         yaw.sigma() < 0.5 * std::abs(turn) && std::abs(yaw.error()) < std::abs(yaw.error() - turn);
 }
 
 void Filter::doubt_magnetometer() {

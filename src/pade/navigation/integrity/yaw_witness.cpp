@@ -33,7 +33,8 @@ double YawWitness::variance_of(double seconds) const {
 bool YawWitness::is_plausible(const Open& change, double sigma) {
   const double measured = std::abs(change.measured);
   const double inertial = std::abs(change.inertial);
-  return std::abs(measured - inertial) < (1 - 1 / kLengths) * std::max(measured, inertial) + kWildSigmas * sigma;
+  return std::abs(measured - inertial) <
+         (1 - 1 / kLengths) * std::max(measured, inertial) + kWildSigmas * sigma;
 }
 
 /// Noise has made the measured changes longer, by what is expected of it.
