@@ -27,7 +27,6 @@ constexpr double kLeastTurn = 0.2;        // rad
 constexpr double kTurnSigmas = 4.5;       // and by more than so many
 constexpr double kBentRate = 0.002;       // rad/s, of a bias that was to explain a wrong yaw
 constexpr double kAzimuthAgreement = 10;  // s, for which a doubted magnetometer must fit to be used again
-constexpr double kYawKnown = 0.2;         // rad, to which velocities may judge a magnetometer
 
 /// A covariance with each axis at or above the floor; nothing if it is not a covariance.
 Matrix3d floored(const Matrix3d& covariance, double floor) {
@@ -305,8 +304,7 @@ void Filter::judge_magnetometer(const Innovation& innovation, double turn, doubl
     return;
   }
   const YawWitness& yaw = integrity.yaw;
-  if (!integrity.velocity_doubted && !integrity.position_doubted && yaw.is_clear() &&
-      yaw.sigma() < kYawKnown) {
+  if (!integrity.velocity_doubted && !integrity.position_doubted && yaw.is_clear()) {
     const double apart = std::abs(std::remainder(turn - yaw.error(), 2 * std::numbers::pi));
     if (apart > std::max(kLeastTurn, kTurnSigmas * std::hypot(sigma, yaw.sigma()))) {
       doubt_magnetometer();

@@ -13,6 +13,7 @@ constexpr double kMemory = 20;        // s
 constexpr double kForceError = 0.03;  // m/s², of tilt and bias together
 constexpr double kLengths = 1.4;      // by which the two may differ
 constexpr double kLeastCoherence = 0.8;
+constexpr double kKnown = 0.2;     // rad; what is less certain may be noise, whose angle is any
 constexpr double kWildSigmas = 4;  // sigmas
 
 }  // namespace
@@ -80,7 +81,7 @@ YawWitness::Changes YawWitness::total() const {
 bool YawWitness::is_clear() const {
   const Changes all = total();
   const double size = std::abs(all.turn);
-  return size > all.inertial / kLengths && size < kLengths * all.inertial &&
+  return sigma() < kKnown && size > all.inertial / kLengths && size < kLengths * all.inertial &&
          size * size > kLeastCoherence * all.inertial * all.measured;
 }
 

@@ -25,7 +25,8 @@ class YawWitness {
   void interrupt() { has_velocity_ = false; }
   void forget() { *this = {}; }
 
-  /// Whether the changes of the last 20 s are of one length, and their directions differ by one angle.
+  /// Whether the changes of the last 20 s are of one length, and their directions differ by one angle that is
+  /// known to 0.2 rad.
   [[nodiscard]] bool is_clear() const;
   /// By which the estimate has to be turned, rad.
   [[nodiscard]] double error() const { return std::arg(total().turn); }
