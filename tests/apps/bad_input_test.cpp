@@ -155,7 +155,7 @@ TEST_F(BadInput, AFullDiskLeavesNothing) {
 }
 
 TEST_F(BadInput, CtrlCLeavesNothing) {
-  const Outcome outcome = shell("timeout -s INT 0.7 " + kPade + " map " + flight().string() +
+  const Outcome outcome = shell("timeout --foreground -s INT 0.7 " + kPade + " map " + flight().string() +
                                 " --flow opencv-pyrlk --out " + out().string() + "; echo code $?");
   EXPECT_THAT(outcome.text, testing::AnyOf(HasSubstr("code 124"), HasSubstr("code 130")));
   EXPECT_FALSE(fs::exists(out()));
