@@ -96,12 +96,12 @@ class FreeSpaceSearch {
   };
   using Points = std::array<double, 24>;  // eight: all x, all y, all z
   /// The eight parts of a cube, as the image and its witnesses see them.
-  struct Parts {
-    Points centres;  // in the camera's frame
-    Eighths now;
-    std::array<Eighths, 32> witnessed;
-    unsigned wanted;          // what the image knows nothing of is left out
-    std::uint32_t asked = 0;  // of the witnesses
+  struct Parts {       // NOLINT(*-pro-type-member-init): filled as witnesses are asked
+    Points centres{};  // in the camera's frame
+    Eighths now{};
+    std::array<Eighths, 32> witnessed;  // by those that were asked
+    unsigned wanted = 0;                // what the image knows nothing of is left out
+    std::uint32_t asked = 0;            // of the witnesses
   };
 
   [[nodiscard]] Cube part_of(const Cube& cube, std::uint64_t i) const {

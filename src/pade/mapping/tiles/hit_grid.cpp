@@ -45,10 +45,11 @@ HitGrid::Tile& HitGrid::opened(std::uint64_t corner) {
   Slot& slot = slots_[slot_of(corner)];
   if (slot.tile == nullptr) {
     if (used_ == tiles_.size()) tiles_.push_back(std::make_unique<Tile>());
-    slot = {corner, tiles_[used_++].get()};
-    slot.tile->key = {static_cast<std::uint16_t>(corner), static_cast<std::uint16_t>(corner >> 16U),
-                      static_cast<std::uint16_t>(corner >> 32U)};
-    slot.tile->code = morton_code(slot.tile->key);
+    Tile& fresh = *tiles_[used_++];
+    fresh.key = {static_cast<std::uint16_t>(corner), static_cast<std::uint16_t>(corner >> 16U),
+                 static_cast<std::uint16_t>(corner >> 32U)};
+    fresh.code = morton_code(fresh.key);
+    slot = {corner, &fresh};
   }
   return *slot.tile;
 }

@@ -58,14 +58,14 @@ class HitGrid {
 /// which index of it.
 struct AxisNeighbours {
   AxisNeighbours(int coordinate, std::size_t tiles, unsigned axis) {
-    for (int i = 0; i < 3; ++i) {
-      const int at = (coordinate & 7) + i - 1;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const int at = (coordinate & 7) + static_cast<int>(i) - 1;
       tile[i] = tiles * static_cast<std::size_t>(1 + (at >> 3));
       index[i] = kSpreadBits[static_cast<std::size_t>(at & 7)] << axis;
     }
   }
-  std::size_t tile[3];   // NOLINT(*-avoid-c-arrays)
-  std::size_t index[3];  // NOLINT(*-avoid-c-arrays)
+  std::array<std::size_t, 3> tile{};
+  std::array<std::size_t, 3> index{};
 };
 
 /// Whether a voxel next to one, or itself, has more points.

@@ -60,10 +60,7 @@ template <bool kInside>
     const double z_near = z - half_z;
     const double z_far = z + half_z;
     int is_inside = 1;
-    if (!kInside) {
-      is_inside = (along(view, 0, x, y, z) >= 0) & (along(view, 1, x, y, z) >= 0) &
-                  (along(view, 2, x, y, z) >= 0) & (along(view, 3, x, y, z) >= 0);
-    }
+    for (int side = 0; side < (kInside ? 0 : 4); ++side) is_inside &= along(view, side, x, y, z) >= 0 ? 1 : 0;
     out.is_seen[i] = is_inside & (z_far > 0) & (z_near < view.range) & (z_near > 0.02 * z_far);
     out.z_far[i] = z_far;
     const double per_near = 1 / (out.is_seen[i] != 0 ? z_near : 1);
@@ -149,7 +146,7 @@ struct Extents {
   scale = scale > most ? most : scale;
   const Ints fine = pixels.level > 0 ? pixels.level - 1 : pixels.level;
   set_cells(pixels, fine, out);
-  const Ints level = (out.columns > kRow) | (out.rows > kRow) ? pixels.level : fine;
+  const Ints level = ((out.columns > kRow) | (out.rows > kRow)) ? pixels.level : fine;
   set_cells(pixels, level < scale ? scale : level, out);
 }
 
@@ -306,8 +303,8 @@ void measured_row(const float* depth, const float* variance, const unsigned char
     const double sigma = variance != nullptr ? __builtin_sqrt(static_cast<double>(variance[u])) : 0.0;
     const bool is_measured = state == nullptr || state[u] == 0;
     const double end = clamped(z - margin_sigmas * sigma, range);
-    ends[u] = is_measured & (z > 0) & (sigma >= 0) & (sigma < kInfinity) ? static_cast<float>(end)
-                                                                         : __builtin_nanf("");
+    const bool is_known = is_measured & (z > 0) & (sigma >= 0) & (sigma < kInfinity);
+    ends[u] = is_known ? static_cast<float>(end) : __builtin_nanf("");
   }
 }
 
