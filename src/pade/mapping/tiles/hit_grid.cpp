@@ -43,15 +43,14 @@ const HitGrid::Tile* HitGrid::find(std::uint64_t corner) const { return slots_[s
 HitGrid::Tile& HitGrid::opened(std::uint64_t corner) {
   if (2 * used_ >= slots_.size()) grow();
   Slot& slot = slots_[slot_of(corner)];
-  if (slot.tile == nullptr) {
-    if (used_ == tiles_.size()) tiles_.push_back(std::make_unique<Tile>());
-    Tile& fresh = *tiles_[used_++];
-    fresh.key = {static_cast<std::uint16_t>(corner), static_cast<std::uint16_t>(corner >> 16U),
-                 static_cast<std::uint16_t>(corner >> 32U)};
-    fresh.code = morton_code(fresh.key);
-    slot = {corner, &fresh};
-  }
-  return *slot.tile;
+  if (slot.tile != nullptr) return *slot.tile;
+  if (used_ == tiles_.size()) tiles_.push_back(std::make_unique<Tile>());
+  Tile& fresh = *tiles_[used_++];
+  fresh.key = {static_cast<std::uint16_t>(corner), static_cast<std::uint16_t>(corner >> 16U),
+               static_cast<std::uint16_t>(corner >> 32U)};
+  fresh.code = morton_code(fresh.key);
+  slot = {corner, &fresh};
+  return fresh;
 }
 
 void HitGrid::grow() {
