@@ -170,6 +170,7 @@ class Filter {
   [[nodiscard]] bool velocities_deny(double turn) const;
   void doubt_magnetometer();
   bool check_yaw(const GnssVelocity& velocity, const Prediction<3>& prediction);
+  void open_common_yaw(double sigma);
   void turn_to_velocities();
   void hear_dispute(Dispute::Ruling ruling);
   void compare_gnss(const Vector3d& position, const Matrix3d& white);

@@ -281,9 +281,7 @@ void Filter::judge_azimuth(InnovationWindow& window, const Innovation& innovatio
     // A magnetometer near iron must not make the filter give itself up.
     integrity.last_opening = before.last_opening;
     integrity.openings = std::max(before.openings, std::min(integrity.openings, 2));
-    const Vector3d up = core_.state.X.R.conjugate() * Vector3d::UnitZ();
-    const double turn = innovation.residual.x();
-    P_.block<3, 3>(kPhi, kPhi) += turn * turn * up * up.transpose();
+    open_common_yaw(innovation.residual.x());
     window.forget();
   }
   integrity.settle(now);
@@ -353,13 +351,27 @@ bool Filter::check_yaw(const GnssVelocity& velocity, const Prediction<3>& predic
   return true;
 }
 
+/// A yaw that is wrong has been wrong: what turns the present pose turns those that are remembered, and
+/// leaves the motion between them without a turn.
+void Filter::open_common_yaw(double sigma) {
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxState, 1> turn = decltype(turn)::Zero(size());
+  turn.segment<3>(kPhi) = core_.state.X.R.conjugate() * Vector3d::UnitZ();
+  if (options_.camera)
+    turn.segment<3>(camera_at() + kAnchorPose) = core_.camera.anchor.rotation.conjugate() * Vector3d::UnitZ();
+  for (int i = 0; i < clones_; ++i) {
+    const Pose& pose = clone_poses_[static_cast<std::size_t>(i)];
+    turn.segment<3>(clone_at(i)) = pose.rotation.conjugate() * Vector3d::UnitZ();
+  }
+  P_ += sigma * sigma * turn * turn.transpose();
+}
+
 void Filter::turn_to_velocities() {
   const double error = core_.integrity.yaw.error();
   const double sigma = core_.integrity.yaw.sigma();
   core_.integrity.raise(core_.state.time);
   core_.integrity.velocity.forget();
   const Vector3d up = core_.state.X.R.conjugate() * Vector3d::UnitZ();
-  P_.block<3, 3>(kPhi, kPhi) += error * error * up * up.transpose();
+  open_common_yaw(error);
   P_.block<3, 3>(kGyroscopeBias, kGyroscopeBias) += kBentRate * kBentRate * up * up.transpose();
   Prediction<1> about_vertical;
   about_vertical.H.setZero();
