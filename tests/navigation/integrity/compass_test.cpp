@@ -114,6 +114,7 @@ TEST(YawWitness, IsNotMisledByVelocitiesThatJump) {
 struct Outcome {
   double until = 0;    ///< s up to which the yaw was wrong by more than 5 degrees
   double worst = 0;    ///< rad, of the yaw, from 30 s on
+  double turn = 0;     ///< rad, error of the turn over a tenth of a second, worst
   double fastest = 0;  ///< error of the velocity in the body from take-off on, m/s
   Health health;
 };
@@ -142,6 +143,13 @@ Outcome fly(double turned, double since, std::uint64_t seed, const Vector3d& iro
       navigator.add(epoch.velocity);
     }
     if (i % 20 != 0) continue;
+    // Seen as relative motion: over the moment at which the yaw is turned too.
+    const RelativePose step = navigator.relative_pose(at(t - 0.1), at(t), Pose{});
+    if (step.answer == Answer::valid && t > 3) {
+      const Eigen::Quaterniond truly = Flight{}.at(t - 0.1).R_world_body.conjugate() * state.R_world_body;
+      const Eigen::Quaterniond believed(step.motion.R_reference_other);
+      outcome.turn = std::max(outcome.turn, believed.angularDistance(truly));
+    }
     const AbsolutePose known = navigator.absolute_pose(state.time);
     if (known.answer != Answer::valid) continue;
     const Vector3d east = state.R_world_body.conjugate() * known.T_world_body.rotation * Vector3d::UnitX();
@@ -173,6 +181,7 @@ TEST_P(WrongCompass, IsLeftOut) {
     const Outcome outcome = fly(GetParam() * kDegree, 0, seed);
     EXPECT_GE(outcome.health.magnetometer_doubted, 1U) << seed;
     EXPECT_LT(outcome.until, 28) << seed;
+    EXPECT_LT(outcome.turn, 1 * kDegree) << seed << ": what turns the yaw is no motion";
     EXPECT_LT(outcome.worst, 5 * kDegree) << seed;
     EXPECT_LT(outcome.fastest, 0.65) << seed;
     EXPECT_EQ(outcome.health.restarts, 0U) << seed;
