@@ -288,8 +288,8 @@ void Filter::judge_azimuth(InnovationWindow& window, const Innovation& innovatio
 }
 
 /// Velocities and inertial sensors know the yaw where the vehicle changes its velocity, and need no compass.
-/// @param turn   that the magnetometer asks for if the vehicle has no iron, rad. @param sigma  of it, the
-/// iron's
+/// @param turn   that the magnetometer asks for if the vehicle has no iron, rad
+/// @param sigma  of it, by the magnetometer's noise and the iron that a vehicle may have, rad
 void Filter::judge_magnetometer(const Innovation& innovation, double turn, double sigma) {
   Integrity& integrity = core_.integrity;
   if (!integrity.watching || innovation.verdict == Verdict::unusable) return;
